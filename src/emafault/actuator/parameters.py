@@ -1,0 +1,124 @@
+"""Parameters of one simulated run: the actuator's own, the fault, the conditions and one field for every effect parameter.
+
+A run is a record of a NumPy structured array, so that thousands of runs are one array and the compiled simulation reads
+fields by name. The field of parameter ``a`` of effect ``stribeck`` is ``stribeck_a``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..effects import EFFECTS
+from ..errors import InputError
+
+ECCENTRICITY_LAWS = ("stator_fixed", "rotor_angle", "rotor_angle_per_phase")
+
+
+@dataclass(frozen=True)
+class ActuatorParameters:
+    """The nominal actuator (SI; angles in rad, mechanical unless called electrical); numbers live in conf/actuator."""
+
+    bus_voltage: float  # V
+    resistance: float  # ohm per phase at the reference temperature
+    inductance: float  # H per phase
+    back_emf: float  # V s/rad per phase
+    pole_pairs: int
+    inertia: float  # kg m2 at the motor
+    viscous_friction: float  # N m s/rad at the motor
+    coulomb_friction: float  # N m at the motor
+    static_over_coulomb: float
+    gear_ratio: float  # motor over output
+    backlash: float  # rad at the output, total play
+    end_stop: float  # rad at the output, either side
+    current_limit: float  # A
+    speed_limit: float  # rad/s at the motor
+    position_gain: float  # 1/s
+    speed_gain: float  # A s/rad
+    speed_integral_gain: float  # A/rad
+    hysteresis: float  # A, half band
+    switch_resistance: float  # ohm
+    diode_voltage: float  # V
+    copper_coefficient: float  # 1/K
+    reference_temperature: float  # degC
+    control_period: float  # s
+
+
+_CONDITIONS = (
+    ("shorted_turns", np.float64, (3,)),  # N_j
+    ("eccentricity", np.float64, (2,)),  # xi_x, xi_y
+    ("dT", np.float64),  # winding at the start, K above the reference temperature; also the ambient
+    ("dT_magnet", np.float64),  # magnets, K above the reference temperature
+    ("eccentricity_law", np.int64),
+    ("theta_0", np.float64),  # rotor angle at the start, rad
+)
+
+RUN_DTYPE = np.dtype(
+    [(f.name, np.float64) for f in fields(ActuatorParameters)]
+    + list(_CONDITIONS)
+    + [(effect.field(name), np.float64) for effect in EFFECTS.values() for name in effect.parameters]
+)
+
+
+def make_runs(
+    actuator: ActuatorParameters,
+    faults: np.ndarray,
+    *,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    eccentricity_law: str = "stator_fixed",
+    dT_magnet: np.ndarray | float | None = None,
+    theta_0: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Build the records of a batch of runs.
+
+    Parameters
+    ----------
+    actuator : nominal parameters
+    faults : (run, 6) fault vectors
+    effects : effect id -> parameter -> value (SI; a scalar or one value a run); what is not named stays off. A unit's
+        tolerances are values of the calibration effects.
+    dT_magnet : K above the reference temperature; None puts the magnets at the winding's temperature
+
+    Returns
+    -------
+    (run,) structured array of ``RUN_DTYPE``
+
+    Raises
+    ------
+    InputError : an unknown effect, parameter or eccentricity law
+    """
+    faults = np.atleast_2d(np.asarray(faults, float))
+    runs = np.zeros(len(faults), RUN_DTYPE)
+    for f in fields(actuator):
+        runs[f.name] = getattr(actuator, f.name)
+    for effect in EFFECTS.values():
+        for name, parameter in effect.parameters.items():
+            runs[effect.field(name)] = parameter.off
+    runs["shorted_turns"], runs["eccentricity"], runs["dT"] = faults[:, :3], faults[:, 3:5], faults[:, 5]
+    runs["dT_magnet"] = faults[:, 5] if dT_magnet is None else dT_magnet
+    if eccentricity_law not in ECCENTRICITY_LAWS:
+        raise InputError(
+            f"eccentricity_law: got '{eccentricity_law}', accepted are {', '.join(ECCENTRICITY_LAWS)}"
+        )
+    runs["eccentricity_law"] = ECCENTRICITY_LAWS.index(eccentricity_law)
+    runs["theta_0"] = theta_0
+    set_effects(runs, effects or {})
+    return runs
+
+
+def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, float]]) -> None:
+    """Write effect parameters into existing records, in place.
+
+    Raises
+    ------
+    InputError : an unknown effect or parameter, naming what is accepted
+    """
+    for effect_id, values in effects.items():
+        if effect_id not in EFFECTS:
+            raise InputError(f"effects: '{effect_id}' is not known, accepted are {', '.join(EFFECTS)}")
+        effect = EFFECTS[effect_id]
+        for name, value in values.items():
+            if name not in effect.parameters:
+                accepted = ", ".join(effect.parameters)
+                raise InputError(f"effects.{effect_id}: '{name}' is not known, accepted are {accepted}")
+            runs[effect.field(name)] = value

@@ -1,0 +1,57 @@
+"""The catalogue of effects that the nominal actuator leaves out.
+
+Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, off value, realistic range and,
+for calibration effects, the tolerance of a unit within its specification) and one term in the compiled physics, which
+reads the field ``<id>_<parameter>`` of the run's record. At the off values the nominal actuator is had exactly.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from omegaconf import OmegaConf
+
+FOLDER = Path(__file__).resolve().parents[3] / "conf" / "effect"
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One parameter: its units, its value when off, its realistic range, its tolerance (1 sigma, relative to off)."""
+
+    units: str
+    off: float
+    low: float
+    high: float
+    tolerance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One row of the catalogue; ``kind`` is ``structural`` or ``calibration``."""
+
+    id: str
+    kind: str
+    equations: tuple[str, ...]
+    parameters: dict[str, EffectParameter]
+
+    def field(self, parameter: str) -> str:
+        """Name of the parameter's field in a run's record."""
+        return f"{self.id}_{parameter}"
+
+    @property
+    def off(self) -> dict[str, float]:
+        """Every parameter at its off value."""
+        return {name: p.off for name, p in self.parameters.items()}
+
+
+def load_effects(folder: Path = FOLDER) -> dict[str, Effect]:
+    """Read the catalogue, in alphabetical order of ids."""
+    effects = {}
+    for path in sorted(folder.glob("*.yaml")):
+        raw = OmegaConf.to_container(OmegaConf.load(path))
+        assert isinstance(raw, dict)
+        parameters = {str(k): EffectParameter(**v) for k, v in raw["parameters"].items()}
+        effects[path.stem] = Effect(path.stem, raw["kind"], tuple(raw["equations"]), parameters)
+    return effects
+
+
+EFFECTS = load_effects()

@@ -1,0 +1,78 @@
+"""What the machine-independent diagnosis needs to know of a machine.
+
+A *twin* turns recordings into a vector of statistics and predicts that vector from parameters. The same code computes the
+statistics of measured and of simulated recordings. Everything else (where, which, how far, groups, unknown) is done by
+the core from these alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What one statistic looks at: a recording, an equation and a stretch of one coordinate."""
+
+    recording: str
+    equation: str
+    along: str  # rotor_angle | rotor_speed | current | temperature | direction | time | order
+    low: float
+    high: float
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of the twin's model, with its prior.
+
+    Nuisances (``effect`` None) have a Gaussian prior (``mean``, ``sd``), always free. Effect parameters are off at ``off``
+    and free, with a prior of width ``sd`` about ``mean`` and hard bounds (``low``, ``high``), only in hypotheses that contain the effect.
+    ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all. ``reports`` False keeps
+    it out of the verdict.
+    """
+
+    name: str
+    units: str
+    off: float
+    mean: float
+    sd: float
+    low: float
+    high: float
+    step: float  # finite-difference step, large against simulation noise and small against curvature
+    effect: str | None = None
+    recordings: tuple[str, ...] | None = None
+    fault: str | None = None  # component of the fault vector that this parameter is, if any
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One candidate cause: its parameters by name and the points at which a fit starts (value per parameter)."""
+
+    effect: str
+    equations: tuple[str, ...]
+    parameters: tuple[str, ...]
+    starts: tuple[tuple[float, ...], ...]
+    kind: str = "structural"  # or calibration
+
+
+class Twin(Protocol):
+    """A machine as the diagnosis sees it. ``part`` is a sequence of recording names."""
+
+    name: str
+    parameters: Sequence[Parameter]
+    hypotheses: Sequence[Hypothesis]
+
+    def cells(self, part: Sequence[str]) -> list[Cell]:
+        """One cell per statistic of these recordings, in the order of the statistics."""
+
+    def observed(self, part: Sequence[str]) -> np.ndarray:
+        """(statistic,) statistics of the recordings as brought."""
+
+    def predict(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
+        """(point, parameter) parameter values -> (point, statistic) expected statistics."""
+
+    def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
+        """(statistic, statistic) covariance of the statistics at one parameter point."""
