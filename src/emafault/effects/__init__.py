@@ -1,8 +1,8 @@
 """The catalogue of effects that the nominal actuator leaves out.
 
-Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, off value, realistic range and,
+Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, nominal value, realistic range and,
 for calibration effects, the tolerance of a unit within its specification) and one term in the compiled physics, which
-reads the field ``<id>_<parameter>`` of the run's record. At the off values the nominal actuator is had exactly.
+reads the field ``<id>_<parameter>`` of the run's record. At the nominal values the nominal actuator is had exactly.
 """
 
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ FOLDER = Path(__file__).resolve().parents[3] / "conf" / "effect"
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One parameter: its units, its value when off, its realistic range, its tolerance (1 sigma, relative to off)."""
+    """One parameter: its units, its nominal value (the effect is off), its realistic range, its tolerance (1 sigma, relative to nominal)."""
 
     units: str
-    off: float
+    nominal: float
     low: float
     high: float
     tolerance: float = 0.0
@@ -39,8 +39,8 @@ class Effect:
 
     @property
     def off(self) -> dict[str, float]:
-        """Every parameter at its off value."""
-        return {name: p.off for name, p in self.parameters.items()}
+        """Every parameter at its nominal value."""
+        return {name: p.nominal for name, p in self.parameters.items()}
 
 
 def load_effects(folder: Path = FOLDER) -> dict[str, Effect]:
