@@ -93,7 +93,7 @@ def make_runs(
         runs[f.name] = getattr(actuator, f.name)
     for effect in EFFECTS.values():
         for name, parameter in effect.parameters.items():
-            runs[effect.field(name)] = parameter.nominal
+            runs[effect.field(name)] = getattr(actuator, parameter.follows) if parameter.follows else parameter.nominal
     runs["shorted_turns"], runs["eccentricity"], runs["dT"] = faults[:, :3], faults[:, 3:5], faults[:, 5]
     runs["dT_magnet"] = faults[:, 5] if dT_magnet is None else dT_magnet
     if eccentricity_law not in ECCENTRICITY_LAWS:

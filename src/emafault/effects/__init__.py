@@ -15,13 +15,17 @@ FOLDER = Path(__file__).resolve().parents[3] / "conf" / "effect"
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One parameter: its units, its nominal value (the effect is off), its realistic range, its tolerance (1 sigma, relative to nominal)."""
+    """One parameter: units, nominal value (the effect is off), realistic range, tolerance (1 sigma, relative to nominal).
+
+    ``follows`` names the actuator's parameter that is the nominal value where the configuration changes it.
+    """
 
     units: str
     nominal: float
     low: float
     high: float
     tolerance: float = 0.0
+    follows: str = ""
 
 
 @dataclass(frozen=True)
