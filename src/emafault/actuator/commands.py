@@ -1,0 +1,102 @@
+"""Position commands at the user shaft, sampled at the control ticks."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def parabolic(t, *, acceleration):
+    """Constant acceleration (rad/s2) from rest."""
+    return 0.5 * acceleration * t * t
+
+
+def ramp(t, *, speed):
+    """Constant speed (rad/s)."""
+    return speed * t
+
+
+def step(t, *, amplitude, time):
+    """A step of ``amplitude`` (rad) at ``time`` (s)."""
+    return np.where(t >= time, amplitude, 0.0)
+
+
+def sine(t, *, amplitude, frequency):
+    """A sine of ``amplitude`` (rad) and ``frequency`` (Hz)."""
+    return amplitude * np.sin(2.0 * np.pi * frequency * t)
+
+
+def chirp(t, *, amplitude, frequency_start, frequency_end):
+    """A sine of ``amplitude`` (rad) whose frequency (Hz) rises linearly over the record."""
+    rate = (frequency_end - frequency_start) / max(t[-1], 1e-12)
+    return amplitude * np.sin(2.0 * np.pi * (frequency_start * t + 0.5 * rate * t * t))
+
+
+def reversal(t, *, amplitude, speed):
+    """Constant speed (rad/s) to and fro between +amplitude and -amplitude (rad), starting from zero."""
+    phase = (speed * t / amplitude + 1.0) % 4.0
+    return amplitude * np.where(phase < 2.0, phase - 1.0, 3.0 - phase)
+
+
+COMMANDS: dict[str, Callable[..., np.ndarray]] = {f.__name__: f for f in (parabolic, ramp, step, sine, chirp, reversal)}
+
+
+def command_positions(name: str, settings: Mapping, duration: float, control_period: float) -> np.ndarray:
+    """Sample a command at the control ticks.
+
+    Parameters
+    ----------
+    name : one of ``COMMANDS`` or ``file`` (settings: path of a text file with columns time (s) and position (rad))
+    settings : the command's own settings (SI)
+
+    Returns
+    -------
+    (tick+1,) user-shaft angle (rad)
+
+    Raises
+    ------
+    InputError : an unknown command or setting, or a file that cannot be read
+    """
+    ticks = control_period * np.arange(round(duration / control_period) + 2)
+    if name == "file":
+        return read_command(settings["path"], duration, control_period)
+    if name not in COMMANDS:
+        raise InputError(f"command: got '{name}', accepted are {', '.join(COMMANDS)} and file")
+    try:
+        return np.asarray(COMMANDS[name](ticks, **settings), float)
+    except TypeError as error:
+        raise InputError(f"command {name}: {error}") from error
+
+
+def read_command(path: str | Path, duration: float, control_period: float) -> np.ndarray:
+    """Read a command from a CSV or white-space file with two columns, time (s) and position (rad).
+
+    Raises
+    ------
+    InputError : a missing or unreadable file, or time that does not increase
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"command file {path}: no such file")
+    try:
+        text = path.read_text().replace(",", " ").splitlines()
+        rows = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
+        if rows and not rows[0].split()[0].replace(".", "").replace("-", "").replace("e", "").isdigit():
+            rows = rows[1:]
+        table = np.loadtxt(rows, ndmin=2)
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(f"command file {path}: not a table of numbers ({error})") from error
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or np.any(np.diff(table[:, 0]) <= 0):
+        raise InputError(f"command file {path}: two columns, increasing time (s) and position (rad), are accepted")
+    return resample(table[:, 0], table[:, 1], duration, control_period)
+
+
+def resample(time: np.ndarray, position: np.ndarray, duration: float, control_period: float) -> np.ndarray:
+    """Interpolate positions (rad) given at times (s) linearly to the control ticks; before the first, from zero at t = 0."""
+    ticks = control_period * np.arange(round(duration / control_period) + 2)
+    if time[0] > 0.0:
+        first = position[0] - (position[1] - position[0]) / (time[1] - time[0]) * time[0]
+        time, position = np.concatenate([[0.0], time]), np.concatenate([[first], position])
+    return np.interp(ticks, time, position)

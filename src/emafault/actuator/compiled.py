@@ -1,0 +1,28 @@
+"""One decorator for everything that numba compiles, with a cache that knows every source it depends on."""
+
+import hashlib
+import os
+from pathlib import Path
+
+_SOURCES = sorted(Path(__file__).parent.glob("*.py")) + sorted(
+    (Path(__file__).resolve().parents[3] / "conf" / "effect").glob("*.yaml")
+)
+
+
+def source_digest() -> str:
+    """Digest of the sources and of the catalogue that the compiled code depends on."""
+    digest = hashlib.sha256()
+    for path in _SOURCES:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# numba invalidates a cached function by the time of its own file only; a folder per digest covers its callees too.
+# It must be set before numba is imported, and never overrides what the user has set.
+_ROOT = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "emafault" / source_digest()))
+
+import numba  # noqa: E402
+
+numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]
+compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
