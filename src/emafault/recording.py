@@ -152,9 +152,7 @@ def _read_open(path: Path, file) -> Recording:
     def values(name: str, dims: tuple[str, ...], unit: str | None) -> np.ndarray:
         variable = file.variables[name]
         if variable.dimensions != dims:
-            raise InputError(
-                f"{path}: {name} has dimensions {variable.dimensions}, the format asks for {dims}"
-            )
+            raise InputError(f"{path}: {name} has dimensions {variable.dimensions}, the format asks for {dims}")
         got = getattr(variable, "units", None)
         if unit is not None and got != unit:
             raise InputError(f"{path}: {name} has unit '{got}', the format asks for '{unit}'")
@@ -204,7 +202,12 @@ def _read_open(path: Path, file) -> Recording:
     if health not in ("healthy", "unknown", "seeded"):
         raise InputError(f"{path}: health is '{health}', accepted are healthy, unknown and seeded")
     return Recording(
-        time=time, ambient_temperature=ambient, fault=fault, attributes=attributes, name=path.name, **data  # type: ignore[arg-type]
+        time=time,
+        ambient_temperature=ambient,
+        fault=fault,
+        attributes=attributes,
+        name=path.name,
+        **data,  # type: ignore[arg-type]
     )
 
 

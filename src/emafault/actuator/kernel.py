@@ -28,8 +28,11 @@ def crossing(c0, c1, c2, c3, c4, h):
     end = c0 + h * (c1 + h * (c2 + h * (c3 + h * c4)))
     if c0 == 0.0 or c0 * end > 0.0:
         return NEVER
-    t = -c0 / c1 if c1 != 0.0 else h
-    for _ in range(5):
+    t = h
+    if c1 != 0.0:
+        t = -c0 / c1
+        t *= 1.0 - c2 * t / c1
+    for _ in range(6):
         if not 0.0 <= t <= h:
             break
         value = c0 + t * (c1 + t * (c2 + t * (c3 + t * c4)))
@@ -38,10 +41,10 @@ def crossing(c0, c1, c2, c3, c4, h):
             break
         step = value / slope
         t -= step
-        if abs(step) < 1e-17:
+        if abs(step) <= 1e-7 * t:  # quadratic convergence: what remains is below rounding
+            if 0.0 < t <= h:
+                return t
             break
-    if 0.0 < t <= h and abs(c0 + t * (c1 + t * (c2 + t * (c3 + t * c4)))) <= 1e-9 * abs(c0) + 1e-15:
-        return t
     low, high = 0.0, h
     for _ in range(60):
         t = 0.5 * (low + high)
@@ -50,6 +53,23 @@ def crossing(c0, c1, c2, c3, c4, h):
         else:
             high = t
     return high
+
+
+@compiled
+def modulate(p, theta, j, f, df):
+    """Add the shape's harmonics and the angle modulation of phase j to the trapezoid f and its derivative by theta."""
+    x = p.pole_pairs * theta - AXIS[j]
+    f += p.back_emf_shape_h5 * np.sin(5.0 * x) + p.back_emf_shape_h7 * np.sin(7.0 * x)
+    df += p.pole_pairs * (5.0 * p.back_emf_shape_h5 * np.cos(5.0 * x) + 7.0 * p.back_emf_shape_h7 * np.cos(7.0 * x))
+    g, dg = angle_modulation(p, theta, j)
+    return f * g, df * g + f * dg
+
+
+@compiled
+def mean_square(start, end, mean):
+    """Mean square of a current over a segment from its ends and mean (exact for a parabola up to its bow squared)."""
+    middle = 1.5 * mean - 0.25 * (start + end)
+    return (start * start + 4.0 * middle * middle + end * end) / 6.0
 
 
 @compiled
@@ -79,7 +99,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     """
     records = speed.shape[0]
     tick_period = p.control_period
-    # ---- constants of the run -------------------------------------------------------------------------------------
+    # ---- constants of the run
     R_winding, L, k = np.empty(3), np.empty(3), np.empty(3)
     phase_constants(p, R_winding, L, k)
     R_outside = np.array([p.contact_resistance_R_x_a, p.contact_resistance_R_x_b, p.contact_resistance_R_x_c])
@@ -106,11 +126,13 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     coulomb_forward, coulomb_backward = coulomb_torque(p, 1.0), coulomb_torque(p, -1.0)
     limit_forward, limit_backward = static_limit(p, coulomb_forward), static_limit(p, coulomb_backward)
     half_play = 0.5 * p.backlash_blk
-    # ---- state ------------------------------------------------------------------------------------------------------
-    i, y1, y2, y3, y4 = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    R, x, gamma = np.empty(3), np.empty(3), np.empty(3)
-    K, dK = np.empty(3), np.empty(3)  # k_j(theta) (V s/rad) and its derivative by theta
-    rail, drop = np.zeros(3), np.zeros(3)
+    band, drop, supply = p.hysteresis, p.switch_resistance, p.bus_voltage_Vdc
+    largest_k = abs(k[0]) + abs(k[1]) + abs(k[2])
+    inverse_L_pair = np.empty(3)  # of the two phases that conduct when phase j is off
+    for j in range(3):
+        inverse_L_pair[j] = 1.0 / (L[(j + 1) % 3] + L[(j + 2) % 3])
+    # ---- state
+    i, R = np.zeros(3), np.empty(3)
     for j in range(3):
         R[j] = R_winding[j] * (1.0 + p.copper_coefficient * p.dT) + R_outside[j]
     theta, w, moving = p.theta_0, 0.0, 0
@@ -126,12 +148,12 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     while cell + 1 < cells and poles * theta - turns * TWO_PI >= edge[cell + 1]:
         cell += 1
     diode = 0  # of the off phase: +1 lower (i > 0), -1 upper (i < 0), 0 floating
-    # ---- accumulators of the recording interval -----------------------------------------------------------------------
+    # ---- accumulators of the recording interval
     sum_i, sum_Ri, sum_e, start_flux = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     start_theta, start_filtered, sum_bus = theta, 0.0, 0.0
     t, tick, record, segments = 0.0, 0, 0, 0
     while record < records:
-        # ---- control tick ---------------------------------------------------------------------------------------------
+        # ---- control tick
         if t >= tick * tick_period - 1e-12:
             measured = filtered if tau > 0.0 else p.speed_scale_scale * w
             w_ref = ratio * p.position_gain * (command[min(tick, command.shape[0] - 1)] - shaft)
@@ -167,62 +189,64 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         if h > MAX_SEGMENT:
             h = MAX_SEGMENT
             timed = False
-        # ---- inverter ---------------------------------------------------------------------------------------------------
+        # ---- inverter; phases by their role: p driven +, m driven -, o off
         plus, minus = pair[cell, 0], pair[cell, 1]
         off = 3 - plus - minus
-        measured_pair = 0.5 * (gain_i[plus] * i[plus] - gain_i[minus] * i[minus] + offset_i[plus] - offset_i[minus])
-        if high and measured_pair >= I_ref + p.hysteresis - CURRENT_TOLERANCE:
+        ip, im, io = i[plus], i[minus], i[off]
+        gp, gm = 0.5 * gain_i[plus], 0.5 * gain_i[minus]
+        measured_pair = gp * ip - gm * im + 0.5 * (offset_i[plus] - offset_i[minus])
+        if high and measured_pair >= I_ref + band - CURRENT_TOLERANCE:
             high = False
-        elif not high and measured_pair <= I_ref - p.hysteresis + CURRENT_TOLERANCE:
+        elif not high and measured_pair <= I_ref - band + CURRENT_TOLERANCE:
             high = True
-        V = p.bus_voltage_Vdc - p.bus_resistance_R * bus_current
-        rail[plus] = V if high else 0.0
-        rail[minus] = 0.0 if high else V
-        drop[plus] = drop[minus] = p.switch_resistance
-        drop[off] = 0.0
-        diode = 1 if i[off] > 0.0 else (-1 if i[off] < 0.0 else diode)
-        # ---- back-EMF coefficients ------------------------------------------------------------------------------------------
+        V = p.bus_voltage_Vdc - p.bus_resistance_R * bus_current if sagging else supply
+        vp = V if high else 0.0
+        vm = V - vp
+        vo = 0.0
+        Rp, Rm, Ro = R[plus] + drop, R[minus] + drop, R[off]
+        if io != 0.0:
+            diode = 1 if io > 0.0 else -1
+        # ---- back-EMF coefficients k_j(theta) and their derivatives by theta
         into = poles * theta - turns * TWO_PI - edge[cell]
-        for j in range(3):
-            K[j] = value[cell, j] + slope[cell, j] * into
-            dK[j] = slope[cell, j] * poles
+        dKp, dKm, dKo = slope[cell, plus], slope[cell, minus], slope[cell, off]
+        Kp, Km, Ko = value[cell, plus] + dKp * into, value[cell, minus] + dKm * into, value[cell, off] + dKo * into
+        dKp, dKm, dKo = dKp * poles, dKm * poles, dKo * poles
         if modulated:
-            for j in range(3):
-                angle_j = poles * theta - AXIS[j]
-                K[j] += p.back_emf_shape_h5 * np.sin(5.0 * angle_j) + p.back_emf_shape_h7 * np.sin(7.0 * angle_j)
-                dK[j] += poles * (
-                    5.0 * p.back_emf_shape_h5 * np.cos(5.0 * angle_j) + 7.0 * p.back_emf_shape_h7 * np.cos(7.0 * angle_j)
-                )
-                g, dg = angle_modulation(p, theta, j)
-                dK[j] = dK[j] * g + K[j] * dg
-                K[j] *= g
-        for j in range(3):
-            K[j] *= k[j]
-            dK[j] *= k[j]
-        # ---- star network: which phases conduct, star potential ---------------------------------------------------------------
-        for j in range(3):
-            gamma[j] = (1.0 + saturation * i[j] * i[j]) / L[j]
-            x[j] = rail[j] - K[j] * w - (R[j] + drop[j]) * i[j]
-        if diode == 0:
-            star = (gamma[plus] * x[plus] + gamma[minus] * x[minus]) / (gamma[plus] + gamma[minus])
-            floating = star + K[off] * w
-            if floating < -p.diode_voltage - 1e-9:
+            Kp, dKp = modulate(p, theta, plus, Kp, dKp)
+            Km, dKm = modulate(p, theta, minus, Km, dKm)
+            Ko, dKo = modulate(p, theta, off, Ko, dKo)
+        kp, km, ko = k[plus], k[minus], k[off]
+        Kp, Km, Ko = kp * Kp, km * Km, ko * Ko
+        dKp, dKm, dKo = kp * dKp, km * dKm, ko * dKo
+        # ---- star network: which phases conduct, first derivatives of the currents
+        if diode == 0 and abs(w) * largest_k > 0.15 * V:
+            star = 0.5 * (vp + vm - (Kp + Km) * w)
+            if saturation == 0.0:
+                xp, xm = vp - Kp * w - Rp * ip, vm - Km * w - Rm * im
+                star = (xp / L[plus] + xm / L[minus]) / (1.0 / L[plus] + 1.0 / L[minus])
+            if star + Ko * w < -p.diode_voltage - 1e-9:
                 diode = 1
-            elif floating > V + p.diode_voltage + 1e-9:
+            elif star + Ko * w > V + p.diode_voltage + 1e-9:
                 diode = -1
-        if diode == 0:
-            gamma[off] = 0.0
-            x[off] = 0.0
+        pair_only = diode == 0 and saturation == 0.0
+        gammap = gammam = gammao = total = y1o = 0.0
+        inverse_L = inverse_L_pair[off]
+        if pair_only:
+            y1p = (vp - vm - (Kp - Km) * w - (Rp + Rm) * ip) * inverse_L
+            y1m = -y1p
         else:
-            rail[off] = -p.diode_voltage if diode > 0 else V + p.diode_voltage
-            x[off] = rail[off] - K[off] * w - R[off] * i[off]
-        total = 1.0 / (gamma[0] + gamma[1] + gamma[2])
-        star = (gamma[0] * x[0] + gamma[1] * x[1] + gamma[2] * x[2]) * total
-        for j in range(3):
-            y1[j] = gamma[j] * (x[j] - star)
-        # ---- mechanics: driving torque, acceleration ---------------------------------------------------------------------------
-        drive = K[0] * i[0] + K[1] * i[1] + K[2] * i[2]
-        drive_1 = K[0] * y1[0] + K[1] * y1[1] + K[2] * y1[2] + w * (dK[0] * i[0] + dK[1] * i[1] + dK[2] * i[2])
+            gammap = (1.0 + saturation * ip * ip) / L[plus]
+            gammam = (1.0 + saturation * im * im) / L[minus]
+            if diode != 0:
+                gammao = (1.0 + saturation * io * io) / L[off]
+                vo = -p.diode_voltage if diode > 0 else V + p.diode_voltage
+            total = 1.0 / (gammap + gammam + gammao)
+            xp, xm, xo = vp - Kp * w - Rp * ip, vm - Km * w - Rm * im, vo - Ko * w - Ro * io
+            star = (gammap * xp + gammam * xm + gammao * xo) * total
+            y1p, y1m, y1o = gammap * (xp - star), gammam * (xm - star), gammao * (xo - star)
+        # ---- mechanics: driving torque, acceleration
+        drive = Kp * ip + Km * im + Ko * io
+        drive_1 = Kp * y1p + Km * y1m + Ko * y1o + w * (dKp * ip + dKm * im + dKo * io)
         if p.cogging_a != 0.0:
             drive -= p.cogging_a * np.sin(COGGING_ORDER * theta)
             drive_1 -= p.cogging_a * COGGING_ORDER * w * np.cos(COGGING_ORDER * theta)
@@ -256,64 +280,65 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 drive_1 -= (p.compliance_K * twist_1 + p.compliance_C * twist_2) / ratio
         if moving != 0:
             b = (drive_1 - (viscous + friction_slope) * a) * inverse_inertia
-        # ---- higher terms of the series -------------------------------------------------------------------------------------------
-        if saturation == 0.0:
-            for j in range(3):
-                x[j] = -dK[j] * w * w - K[j] * a - (R[j] + drop[j]) * y1[j]
-            star = (gamma[0] * x[0] + gamma[1] * x[1] + gamma[2] * x[2]) * total
-            for j in range(3):
-                y2[j] = gamma[j] * (x[j] - star)
+        # ---- higher derivatives, then Taylor coefficients
+        y2o = y3o = y4o = 0.0
+        if pair_only:
+            y2p = (-(dKp - dKm) * w * w - (Kp - Km) * a - (Rp + Rm) * y1p) * inverse_L
+            y2m = -y2p
         else:
-            star_0 = star
-            u0, u1, u2 = x[0] - star_0, x[1] - star_0, x[2] - star_0
-            g0 = 2.0 * saturation * i[0] * y1[0] / L[0] * u0 if gamma[0] > 0.0 else 0.0
-            g1 = 2.0 * saturation * i[1] * y1[1] / L[1] * u1 if gamma[1] > 0.0 else 0.0
-            g2 = 2.0 * saturation * i[2] * y1[2] / L[2] * u2 if gamma[2] > 0.0 else 0.0
-            for j in range(3):
-                x[j] = -dK[j] * w * w - K[j] * a - (R[j] + drop[j]) * y1[j]
-            star = (gamma[0] * x[0] + gamma[1] * x[1] + gamma[2] * x[2] + g0 + g1 + g2) * total
-            y2[0] = gamma[0] * (x[0] - star) + g0
-            y2[1] = gamma[1] * (x[1] - star) + g1
-            y2[2] = gamma[2] * (x[2] - star) + g2
+            # the changing inductance: gamma' u, with u the voltage across the inductance
+            up, um, uo = xp - star, xm - star, xo - star
+            gp1 = 2.0 * saturation * ip * y1p / L[plus]
+            gm1 = 2.0 * saturation * im * y1m / L[minus]
+            go1 = 2.0 * saturation * io * y1o / L[off] if diode != 0 else 0.0
+            xp = -dKp * w * w - Kp * a - Rp * y1p
+            xm = -dKm * w * w - Km * a - Rm * y1m
+            xo = -dKo * w * w - Ko * a - Ro * y1o
+            star = (gammap * xp + gammam * xm + gammao * xo + gp1 * up + gm1 * um + go1 * uo) * total
+            up1, um1, uo1 = xp - star, xm - star, xo - star
+            y2p, y2m, y2o = gammap * up1 + gp1 * up, gammam * um1 + gm1 * um, gammao * uo1 + go1 * uo
         if moving != 0:
-            drive_2 = K[0] * y2[0] + K[1] * y2[1] + K[2] * y2[2]
-            drive_2 += 2.0 * w * (dK[0] * y1[0] + dK[1] * y1[1] + dK[2] * y1[2])
-            drive_2 += a * (dK[0] * i[0] + dK[1] * i[1] + dK[2] * i[2])
+            drive_2 = Kp * y2p + Km * y2m + Ko * y2o + 2.0 * w * (dKp * y1p + dKm * y1m + dKo * y1o)
+            drive_2 += a * (dKp * ip + dKm * im + dKo * io)
             c = (drive_2 - viscous * b) * inverse_inertia
-        for j in range(3):
-            x[j] = -3.0 * dK[j] * w * a - K[j] * b - (R[j] + drop[j]) * y2[j]
-        star = (gamma[0] * x[0] + gamma[1] * x[1] + gamma[2] * x[2]) * total
-        for j in range(3):
-            y3[j] = gamma[j] * (x[j] - star)
-            x[j] = -(R[j] + drop[j]) * y3[j]
-        star = (gamma[0] * x[0] + gamma[1] * x[1] + gamma[2] * x[2]) * total
-        for j in range(3):
-            y4[j] = gamma[j] * (x[j] - star) * (1.0 / 24.0)
-            y3[j] *= 1.0 / 6.0
-            y2[j] *= 0.5
-        if saturation != 0.0:
-            # one correction by the exact flux balance keeps the saturating phase accurate to third order
-            saturating_third_order(saturation, L, gamma, total, i, y1, y2, y3)
-        # ---- earliest event -----------------------------------------------------------------------------------------------------------
+        if pair_only:
+            y3p = (-3.0 * (dKp - dKm) * w * a - (Kp - Km) * b - (Rp + Rm) * y2p) * inverse_L
+            y4p = -(Rp + Rm) * y3p * inverse_L
+            y3m, y4m = -y3p, -y4p
+        else:
+            gp2 = 2.0 * saturation * (y1p * y1p + ip * y2p) / L[plus]
+            gm2 = 2.0 * saturation * (y1m * y1m + im * y2m) / L[minus]
+            go2 = 2.0 * saturation * (y1o * y1o + io * y2o) / L[off] if diode != 0 else 0.0
+            hp, hm, ho = gp2 * up + 2.0 * gp1 * up1, gm2 * um + 2.0 * gm1 * um1, go2 * uo + 2.0 * go1 * uo1
+            xp = -3.0 * dKp * w * a - Kp * b - Rp * y2p
+            xm = -3.0 * dKm * w * a - Km * b - Rm * y2m
+            xo = -3.0 * dKo * w * a - Ko * b - Ro * y2o
+            star = (gammap * xp + gammam * xm + gammao * xo + hp + hm + ho) * total
+            y3p, y3m, y3o = gammap * (xp - star) + hp, gammam * (xm - star) + hm, gammao * (xo - star) + ho
+            star = -(gammap * Rp * y3p + gammam * Rm * y3m + gammao * Ro * y3o) * total
+            y4p, y4m, y4o = gammap * (-Rp * y3p - star), gammam * (-Rm * y3m - star), gammao * (-Ro * y3o - star)
+        y2p, y2m, y2o = 0.5 * y2p, 0.5 * y2m, 0.5 * y2o
+        y3p, y3m, y3o = y3p / 6.0, y3m / 6.0, y3o / 6.0
+        y4p, y4m, y4o = y4p / 24.0, y4m / 24.0, y4o / 24.0
+        # ---- earliest event
         event = 0
-        gp, gm = 0.5 * gain_i[plus], 0.5 * gain_i[minus]
-        target = I_ref + p.hysteresis if high else I_ref - p.hysteresis
+        target = I_ref + band if high else I_ref - band
         te = crossing(
             measured_pair - target,
-            gp * y1[plus] - gm * y1[minus],
-            gp * y2[plus] - gm * y2[minus],
-            gp * y3[plus] - gm * y3[minus],
-            gp * y4[plus] - gm * y4[minus],
+            gp * y1p - gm * y1m,
+            gp * y2p - gm * y2m,
+            gp * y3p - gm * y3m,
+            gp * y4p - gm * y4m,
             h,
         )
         if te < h:
             h, event = te, 1
         if diode != 0:
-            te = crossing(i[off], y1[off], y2[off], y3[off], y4[off], h)
+            te = crossing(io, y1o, y2o, y3o, y4o, h)
             if te <= h:
                 h, event = te, 2
-            elif i[off] == 0.0 and y1[off] * diode <= 0.0:
-                diode = 0  # pushed back at once: keep floating
+            elif io == 0.0 and y1o * diode <= 0.0:
+                diode = 0  # pushed back at once: it stays floating
                 continue
         if moving != 0:
             if moving > 0:
@@ -337,14 +362,8 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         else:
             held = limit_forward if drive > 0.0 else -limit_backward
             if at_stop == 0 or at_stop * drive < 0.0:
-                te = crossing(
-                    drive - held,
-                    drive_1,
-                    K[0] * y2[0] + K[1] * y2[1] + K[2] * y2[2],
-                    K[0] * y3[0] + K[1] * y3[1] + K[2] * y3[2],
-                    0.0,
-                    h,
-                )
+                torque_2, torque_3 = Kp * y2p + Km * y2m + Ko * y2o, Kp * y3p + Km * y3m + Ko * y3o
+                te = crossing(drive - held, drive_1, torque_2, torque_3, 0.0, h)
                 if te < h:
                     h, event = te, 6
         if compliant:
@@ -359,53 +378,55 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 te = crossing(twist + half_play, twist_1, 0.5 * twist_2, 0.0, 0.0, h)
                 if te < h:
                     h, event = te, 9
-        if diode == 0 and abs(w) * (abs(k[0]) + abs(k[1]) + abs(k[2])) > 0.4 * V:
+        if diode == 0 and abs(w) * largest_k > 0.15 * V:
             # a floating terminal may reach a rail inside the segment: its drift is slow, one secant is exact enough
-            end_w = w + a * h
-            end_star = 0.5 * V - 0.5 * (K[plus] + K[minus] + (dK[plus] + dK[minus]) * w * h) * end_w
-            end_floating = end_star + (K[off] + dK[off] * w * h) * end_w
-            now = 0.5 * V - 0.5 * (K[plus] + K[minus]) * w + K[off] * w
-            over = end_floating - (V + p.diode_voltage) if end_floating > 0.5 * V else -p.diode_voltage - end_floating
-            was = now - (V + p.diode_voltage) if end_floating > 0.5 * V else -p.diode_voltage - now
-            if over > 0.0 and was < 0.0:
-                te = max(h * was / (was - over) * (1.0 + 1e-9), 1e-9)
+            later = w + a * h
+            was = (Ko - 0.5 * (Kp + Km)) * w
+            will = (Ko + dKo * w * h - 0.5 * (Kp + Km + (dKp + dKm) * w * h)) * later
+            reach_at = 0.5 * V + p.diode_voltage
+            if abs(will) > reach_at and abs(was) < reach_at:
+                te = max(h * (reach_at - abs(was)) / (abs(will) - abs(was)), 1e-9)
                 if te < h:
                     h, event = te, 10
         if event != 0:
             timed = False
-        # ---- advance ----------------------------------------------------------------------------------------------------------------------
+        # ---- advance
         d_theta = h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
         if modulated:
             middle = theta + 0.5 * d_theta
             for j in range(3):
-                angle_j = poles * middle - AXIS[j]
                 f = value[cell, j] + slope[cell, j] * (into + 0.5 * poles * d_theta)
-                f += p.back_emf_shape_h5 * np.sin(5.0 * angle_j) + p.back_emf_shape_h7 * np.sin(7.0 * angle_j)
-                g, dg = angle_modulation(p, middle, j)
-                sum_e[j] += k[j] * f * g * d_theta
+                sum_e[j] += k[j] * modulate(p, middle, j, f, 0.0)[0] * d_theta
         else:
-            for j in range(3):
-                sum_e[j] += (K[j] + 0.5 * dK[j] * d_theta) * d_theta
-        loss, into_bus = 0.0, 0.0
-        for j in range(3):
-            area = h * (i[j] + h * (y1[j] / 2.0 + h * (y2[j] / 3.0 + h * (y3[j] / 4.0 + h * y4[j] / 5.0))))
-            sum_i[j] += area
-            sum_Ri[j] += R[j] * area
-            if heated:
-                mid = 0.5 * h
-                mid_i = i[j] + mid * (y1[j] + mid * (y2[j] + mid * y3[j]))
-                end_i = i[j] + h * (y1[j] + h * (y2[j] + h * y3[j]))
-                loss += (R[j] - R_outside[j]) * (i[j] * i[j] + 4.0 * mid_i * mid_i + end_i * end_i) * h / 6.0
-            if sagging and (j == (plus if high else minus) or (j == off and diode < 0)):
-                into_bus += area
-            i[j] += h * (y1[j] + h * (y2[j] + h * (y3[j] + h * y4[j])))
+            sum_e[plus] += (Kp + 0.5 * dKp * d_theta) * d_theta
+            sum_e[minus] += (Km + 0.5 * dKm * d_theta) * d_theta
+            sum_e[off] += (Ko + 0.5 * dKo * d_theta) * d_theta
+        area_p = h * (ip + h * (y1p * 0.5 + h * (y2p / 3.0 + h * (y3p * 0.25 + h * y4p * 0.2))))
+        end_p = ip + h * (y1p + h * (y2p + h * (y3p + h * y4p)))
+        if pair_only:
+            area_m, area_o, end_m, end_o = -area_p, 0.0, -end_p, 0.0
+        else:
+            area_m = h * (im + h * (y1m * 0.5 + h * (y2m / 3.0 + h * (y3m * 0.25 + h * y4m * 0.2))))
+            area_o = -area_p - area_m
+            end_m = im + h * (y1m + h * (y2m + h * (y3m + h * y4m)))
+            end_o = -end_p - end_m
+            sum_i[off] += area_o
+            sum_Ri[off] += Ro * area_o
+        sum_i[plus] += area_p
+        sum_i[minus] += area_m
+        sum_Ri[plus] += R[plus] * area_p
+        sum_Ri[minus] += R[minus] * area_m
         if heated:
-            rate = p.self_heating_heating_rate
-            heat += rate * (loss - heat * h / p.self_heating_Rth)
+            loss = (R[plus] - R_outside[plus]) * mean_square(ip, end_p, area_p / h if h > 0.0 else ip) * h
+            loss += (R[minus] - R_outside[minus]) * mean_square(im, end_m, area_m / h if h > 0.0 else im) * h
+            loss += (R[off] - R_outside[off]) * mean_square(io, end_o, area_o / h if h > 0.0 else io) * h
+            heat += p.self_heating_heating_rate * (loss - heat * h / p.self_heating_Rth)
         if sagging:
+            into_bus = (area_p if high else area_m) + (area_o if diode < 0 else 0.0)
             sum_bus += V * h
             if h > 0.0:
                 bus_current += (into_bus / h - bus_current) * (1.0 - np.exp(-h / BUS_FILTER))
+        i[plus], i[minus], i[off] = end_p, end_m, end_o
         w_before = w
         w += h * (a + h * (0.5 * b + h * c / 6.0))
         theta += d_theta
@@ -419,7 +440,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             if abs(shaft) >= p.end_stop and shaft * w_shaft >= 0.0:
                 shaft = p.end_stop if shaft > 0.0 else -p.end_stop
                 w_shaft = 0.0
-        # ---- what the event changes --------------------------------------------------------------------------------------------------------
+        # ---- what the event changes
         if event == 1:
             high = not high
         elif event == 2:
@@ -459,7 +480,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             shaft = min(max(shaft, -p.end_stop), p.end_stop)
         t = ends_at if timed else t + h
         segments += 1
-        # ---- recording instant -----------------------------------------------------------------------------------------------------------------
+        # ---- recording instant
         if t >= (record + 1) * interval - 1e-12:
             mean_v = 0.0
             for j in range(3):
@@ -480,23 +501,6 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             start_theta, start_filtered, sum_bus = theta, filtered, 0.0
             record += 1
     return segments
-
-
-@compiled
-def saturating_third_order(s, L, gamma, total, i, y1, y2, y3):
-    """Add to y3 what the changing inductance contributes at third order (gamma'' and gamma' terms), star point included."""
-    add = np.zeros(3)
-    for j in range(3):
-        if gamma[j] > 0.0:
-            second = 2.0 * y2[j]  # d2i/dt2
-            u = y1[j] / gamma[j]
-            g1 = 2.0 * s * i[j] * y1[j] / L[j]
-            g2 = 2.0 * s * (y1[j] * y1[j] + i[j] * second) / L[j]
-            u1 = (second - g1 * u) / gamma[j]
-            add[j] = g2 * u + 2.0 * g1 * u1
-    star = (add[0] + add[1] + add[2]) * total
-    for j in range(3):
-        y3[j] += (add[j] - gamma[j] * star) / 6.0
 
 
 @compiled

@@ -97,9 +97,7 @@ def make_runs(
     runs["shorted_turns"], runs["eccentricity"], runs["dT"] = faults[:, :3], faults[:, 3:5], faults[:, 5]
     runs["dT_magnet"] = faults[:, 5] if dT_magnet is None else dT_magnet
     if eccentricity_law not in ECCENTRICITY_LAWS:
-        raise InputError(
-            f"eccentricity_law: got '{eccentricity_law}', accepted are {', '.join(ECCENTRICITY_LAWS)}"
-        )
+        raise InputError(f"eccentricity_law: got '{eccentricity_law}', accepted are {', '.join(ECCENTRICITY_LAWS)}")
     runs["eccentricity_law"] = ECCENTRICITY_LAWS.index(eccentricity_law)
     runs["theta_0"] = theta_0
     set_effects(runs, effects or {})

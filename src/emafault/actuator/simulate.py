@@ -46,7 +46,9 @@ def simulate(
     InputError : an interval or duration that is not positive
     """
     if not (interval > 0.0 and duration >= interval):
-        raise InputError(f"interval {interval} s and duration {duration} s: both must be positive, the interval shorter")
+        raise InputError(
+            f"interval {interval} s and duration {duration} s: both must be positive, the interval shorter"
+        )
     time = time_axis(duration, interval)
     command = np.ascontiguousarray(np.atleast_2d(command), dtype=float)
     n = len(runs)
