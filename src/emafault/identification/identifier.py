@@ -1,0 +1,270 @@
+"""A trained identification as one object: estimator, scaling and intervals, saved as one readable file beside its ONNX."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from ..faults import FAULT_NAMES
+from ..recording import replace_atomically
+from . import closed_form
+from .intervals import ConformalIntervals
+from .network import Network
+from .settings import NetworkSettings, TrainingSettings
+from .training import TrainedNetwork, train
+
+ESTIMATORS = ("network", "closed_form")
+FILE = "identifier.json"
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Identifier:
+    """Features to faults with intervals; ``features`` are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c] or, where the
+
+    reconstruction measures xi by itself, (run, 8) with xi_x and xi_y behind them. A ``unit`` is the (6,) or (run, 6) array of R and k of
+    the healthy unit at 20 degC: features and covariance are scaled to the nominal actuator before use.
+    """
+
+    actuator: ActuatorParameters
+    alpha_m: float
+    intervals: ConformalIntervals
+    network: Network | None = None  # None: the closed form
+    feature_low: np.ndarray | None = None  # (feature,) range of the rows learnt from
+    feature_high: np.ndarray | None = None
+
+    @property
+    def estimator(self) -> str:
+        """``network`` or ``closed_form``."""
+        return "closed_form" if self.network is None else "network"
+
+    @property
+    def parameters(self) -> int:
+        """Number of trained weights; 0 for the closed form."""
+        return 0 if self.network is None else self.network.parameters
+
+    def predict(
+        self, features: np.ndarray, covariance: np.ndarray | None = None, unit: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Faults (run, 6) in SI units.
+
+        Raises
+        ------
+        InputError : features of the wrong shape
+        """
+        features, covariance = self._nominal(features, covariance, unit)
+        return _estimate(self, features, covariance)
+
+    def interval(
+        self,
+        features: np.ndarray,
+        level: float = 0.9,
+        covariance: np.ndarray | None = None,
+        unit: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Low and high end (run, 6) of the prediction interval at ``level``.
+
+        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it the calibration rows' is taken.
+        """
+        features, covariance = self._nominal(features, covariance, unit)
+        value = _estimate(self, features, covariance)
+        half = self.intervals.half_width(level, _variance(self, features, covariance), len(features))
+        return value - half, value + half
+
+    def estimate(
+        self,
+        features: np.ndarray,
+        level: float = 0.9,
+        covariance: np.ndarray | None = None,
+        unit: np.ndarray | None = None,
+    ) -> list[dict[str, dict[str, float]]]:
+        """For each run {"Na": {"value": ..., "low": ..., "high": ...}, ...}."""
+        value = self.predict(features, covariance, unit)
+        low, high = self.interval(features, level, covariance, unit)
+        return [
+            {
+                name: {"value": float(value[n, j]), "low": float(low[n, j]), "high": float(high[n, j])}
+                for j, name in enumerate(FAULT_NAMES)
+            }
+            for n in range(len(value))
+        ]
+
+    def outside(self, features: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
+        """How far each run (run,) lies outside the features learnt from, as a fraction of their range; 0 is inside."""
+        if self.feature_low is None or self.feature_high is None:
+            return np.zeros(len(features))
+        x, _ = self._nominal(features, None, unit)
+        beyond = np.maximum(self.feature_low - x, x - self.feature_high) / (self.feature_high - self.feature_low + 1e-30)
+        return np.maximum(beyond.max(axis=1), 0.0)
+
+    def _nominal(self, features, covariance, unit) -> tuple[np.ndarray, np.ndarray | None]:
+        features = np.atleast_2d(np.asarray(features, float))
+        width = len(self.feature_low) if self.feature_low is not None else features.shape[1]
+        if features.shape[1] != width or width not in (6, 8):
+            raise InputError(f"features: got {features.shape[1]} a run, this identifier accepts {width}")
+        if covariance is not None:
+            covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), 6, 6))
+        if unit is not None:
+            scale = np.broadcast_to(nominal_features(self.actuator) / np.asarray(unit, float), (len(features), 6))
+            features = np.concatenate([features[:, :6] * scale, features[:, 6:]], axis=1)
+            if covariance is not None:
+                covariance = covariance * scale[:, :, None] * scale[:, None, :]
+        return features, covariance
+
+    def save(self, folder: str | Path) -> None:
+        """Write ``identifier.json`` into a folder, whole or not at all.
+
+        Raises
+        ------
+        InputError : the folder cannot be written
+        """
+        plain = {
+            "format": _FORMAT,
+            "estimator": self.estimator,
+            "actuator": asdict(self.actuator),
+            "alpha_m": self.alpha_m,
+            "intervals": self.intervals.to_plain(),
+            "network": self.network.to_plain() if self.network else None,
+            "feature_low": None if self.feature_low is None else self.feature_low.tolist(),
+            "feature_high": None if self.feature_high is None else self.feature_high.tolist(),
+        }
+        replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
+
+    @classmethod
+    def load(cls, folder: str | Path) -> "Identifier":
+        """Read what :meth:`save` wrote.
+
+        Raises
+        ------
+        InputError : no such file, or not one of these
+        """
+        path = Path(folder) / FILE
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; train the experiment first")
+        try:
+            plain = json.loads(path.read_text())
+            if plain["format"] != _FORMAT:
+                raise InputError(f"{path}: format {plain['format']}, accepted is {_FORMAT}")
+            low, high = plain["feature_low"], plain["feature_high"]
+            return cls(
+                ActuatorParameters(**plain["actuator"]),
+                plain["alpha_m"],
+                ConformalIntervals.from_plain(plain["intervals"]),
+                Network.from_plain(plain["network"]) if plain["network"] else None,
+                None if low is None else np.array(low),
+                None if high is None else np.array(high),
+            )
+        except (ValueError, KeyError, TypeError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{path}: not a saved identifier ({error})") from error
+
+
+def nominal_features(actuator: ActuatorParameters) -> np.ndarray:
+    """R0 and k0 of the nominal actuator as six features."""
+    return np.repeat([actuator.resistance, actuator.back_emf], 3)
+
+
+def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
+    if identifier.network is not None:
+        return identifier.network.predict(features)
+    R, k, actuator, alpha_m = features[:, :3], features[:, 3:6], identifier.actuator, identifier.alpha_m
+    if features.shape[1] == 8:
+        return closed_form.inverse_rotor_angle(R, k, features[:, 6:], actuator, alpha_m, covariance)
+    return closed_form.inverse(R, k, actuator, alpha_m)
+
+
+def _variance(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> np.ndarray | None:
+    """Variance (run, 6) that the noise of R and k makes in the estimates; None where it is not known."""
+    if covariance is None or not np.any(np.isfinite(covariance)):
+        return None
+    if features.shape[1] == 6:
+        derivative = closed_form.jacobian(lambda x: _estimate(identifier, x), features)
+    else:  # least squares takes real numbers only
+        columns = []
+        for j in range(6):
+            step = np.zeros(features.shape)
+            step[:, j] = 1e-5 * features[:, j]
+            change = _estimate(identifier, features + step, covariance) - _estimate(identifier, features - step, covariance)
+            columns.append(change / (2.0 * step[:, j : j + 1]))
+        derivative = np.stack(columns, axis=-1)
+    return np.einsum("npi,nij,npj->np", derivative, covariance, derivative)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted identifier and, for a network, how its training went."""
+
+    identifier: Identifier
+    trained: TrainedNetwork | None = None
+
+
+def fit_identifier(
+    estimator: str,
+    features: np.ndarray,
+    faults: np.ndarray,
+    actuator: ActuatorParameters,
+    *,
+    alpha_m: float = 0.0,
+    covariance: np.ndarray | None = None,
+    network: Mapping[str, Any] | NetworkSettings | None = None,
+    training: Mapping[str, Any] | TrainingSettings | None = None,
+    intervals: str = "cross",
+    folds: int = 5,
+    seed: int = 0,
+) -> Fit:
+    """Train an estimator and calibrate its intervals on rows that it, or the network of their fold, was not trained on.
+
+    Parameters
+    ----------
+    estimator : ``network`` or ``closed_form``
+    features : (run, 6) or (run, 8); faults : (run, 6)
+    covariance : (run, 6, 6) of R and k, to normalise the intervals; None where the reconstruction gives none
+    intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the 70/15/15 calibrates)
+
+    Raises
+    ------
+    InputError : an unknown estimator or kind of intervals
+    """
+    if estimator not in ESTIMATORS:
+        raise InputError(f"estimator: got '{estimator}', accepted are {', '.join(ESTIMATORS)}")
+    if intervals not in ("cross", "split"):
+        raise InputError(f"intervals: got '{intervals}', accepted are cross and split")
+    features, faults = np.asarray(features, float), np.asarray(faults, float)
+    if covariance is not None and not np.all(np.isfinite(covariance)):
+        covariance = None
+    placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
+    identifier = Identifier(
+        actuator, alpha_m, placeholder, None, features.min(axis=0), features.max(axis=0)
+    )
+    trained = None
+    if estimator == "network":
+        trained = train(features, faults, network, training, seed)
+        identifier = replace(identifier, network=trained.network)
+
+    def residuals_of(model: Identifier, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        part = None if covariance is None else covariance[rows]
+        return _estimate(model, features[rows], part) - faults[rows], _variance(model, features[rows], part)
+
+    if trained is None:
+        residuals, variance = residuals_of(identifier, np.arange(len(features)))
+        method = "closed form, all rows"
+    elif intervals == "split":
+        residuals, variance = residuals_of(identifier, trained.test_rows)
+        method = "split, test rows"
+    else:
+        order = np.random.default_rng([seed, 20]).permutation(len(features))
+        parts = []
+        for fold, left_out in enumerate(np.array_split(order, folds)):
+            rest = np.setdiff1d(order, left_out)
+            model = train(features[rest], faults[rest], network, training, seed + 1000 * (fold + 1))
+            parts.append(residuals_of(replace(identifier, network=model.network), left_out))
+        residuals = np.concatenate([part[0] for part in parts])
+        variance = None if covariance is None else np.concatenate([v for _, v in parts if v is not None])
+        method = f"cross-conformal, {folds} folds"
+    return Fit(replace(identifier, intervals=ConformalIntervals.calibrate(residuals, variance, method)), trained)

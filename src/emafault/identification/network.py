@@ -1,0 +1,95 @@
+"""The trained network with its scaling: from features in SI units to faults in SI units."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .levenberg_marquardt import Weights, outputs
+from .settings import NetworkSettings
+
+
+@dataclass(frozen=True)
+class Scaler:
+    """Coordinates of the features (linear, or the log of R and k), then standardisation; targets are standardised too."""
+
+    coordinates: str
+    feature_mean: np.ndarray  # (feature,)
+    feature_scale: np.ndarray
+    fault_mean: np.ndarray  # (6,)
+    fault_scale: np.ndarray
+
+    @classmethod
+    def fit(cls, coordinates: str, features: np.ndarray, faults: np.ndarray) -> "Scaler":
+        """Mean and standard deviation of the training rows; a constant column keeps scale 1."""
+        z = coordinates_of(coordinates, features)
+
+        def spread(x: np.ndarray) -> np.ndarray:
+            deviation = x.std(axis=0)
+            return np.where(deviation > 1e-12, deviation, 1.0)
+
+        return cls(coordinates, z.mean(axis=0), spread(z), faults.mean(axis=0), spread(faults))
+
+    def features(self, x: np.ndarray) -> np.ndarray:
+        """Standardised coordinates (run, feature) of features in SI units."""
+        return (coordinates_of(self.coordinates, x) - self.feature_mean) / self.feature_scale
+
+    def faults(self, f: np.ndarray) -> np.ndarray:
+        """Standardised faults (run, 6)."""
+        return (f - self.fault_mean) / self.fault_scale
+
+    def faults_back(self, t: np.ndarray) -> np.ndarray:
+        """Faults in SI units from standardised ones."""
+        return t * self.fault_scale + self.fault_mean
+
+
+def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
+    """The features as they are, or with R and k (the first six) in logarithms.
+
+    Raises
+    ------
+    InputError : a logarithm of a value that is not positive
+    """
+    if coordinates == "linear":
+        return features
+    if np.any(np.real(features[:, :6]) <= 0.0):
+        row, column = np.argwhere(np.real(features[:, :6]) <= 0.0)[0]
+        name = ("R_a", "R_b", "R_c", "k_a", "k_b", "k_c")[column]
+        raise InputError(f"features: {name} of run {row} is {np.real(features[row, column]):.4g}, accepted are values above 0")
+    return np.concatenate([np.log(features[:, :6]), features[:, 6:]], axis=1)
+
+
+@dataclass(frozen=True)
+class Network:
+    """A dense network with tanh-like hidden layers and a linear output, and its scaler."""
+
+    settings: NetworkSettings
+    scaler: Scaler
+    weights: Weights
+
+    @property
+    def parameters(self) -> int:
+        """Number of weights and biases."""
+        return sum(W.size for W in self.weights)
+
+    def predict(self, features: np.ndarray) -> np.ndarray:
+        """Faults (run, 6) from features (run, feature) in SI units."""
+        return self.scaler.faults_back(outputs(self.weights, self.settings.activation, self.scaler.features(features)))
+
+    def to_plain(self) -> dict[str, Any]:
+        """Everything as plain lists; numbers survive JSON exactly."""
+        scaler = {key: value if isinstance(value, str) else value.tolist() for key, value in vars(self.scaler).items()}
+        return {
+            "settings": self.settings.as_dict(),
+            "scaler": scaler,
+            "weights": [W.tolist() for W in self.weights],
+        }
+
+    @classmethod
+    def from_plain(cls, plain: dict[str, Any]) -> "Network":
+        """The inverse of :meth:`to_plain`."""
+        scaler = {key: value if isinstance(value, str) else np.array(value) for key, value in plain["scaler"].items()}
+        return cls(
+            NetworkSettings.of(plain["settings"]), Scaler(**scaler), [np.array(W) for W in plain["weights"]]
+        )
