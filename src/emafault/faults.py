@@ -1,11 +1,10 @@
 """The fault vector f = [Na, Nb, Nc, xi_x, xi_y, dT] and how fault vectors are sampled.
 
-N_j is the fraction of shorted turns of phase j (1), xi the static eccentricity in cartesian form (1) and dT the winding's
-deviation from 20 degC (K).
+N_j is the fraction of shorted turns of phase j (1), xi the static eccentricity in cartesian form (1) and dT the
+winding's deviation from 20 degC (K).
 """
 
 import numpy as np
-from scipy.stats import qmc
 
 from .errors import InputError
 
@@ -47,6 +46,8 @@ def sample_faults(
     if scheme == "random":
         unit = np.random.default_rng([seed, 0]).random((runs, 6))
     elif scheme == "sobol":
+        from scipy.stats import qmc  # takes half a second that no other scheme needs
+
         power = max(0, int(np.ceil(np.log2(max(runs, 1)))))
         unit = qmc.Sobol(6, rng=np.random.default_rng([seed, 1])).random_base2(power)[:runs]
     else:

@@ -1,0 +1,249 @@
+"""Datasets: many simulated runs in a few netCDF files (shards), as in the recording format with a leading run axis.
+
+A shard is written block by block, so that memory does not grow with the number of runs, to a temporary name that is
+renamed at the end. Every run is seeded by its own number: the values do not depend on how runs are shared out.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import __version__
+from .actuator.parameters import ActuatorParameters, make_runs
+from .effects import EFFECTS
+from .errors import InputError
+from .faults import FAULT_NAMES, sample_faults
+from .progress import progress
+from .recording import PHASES, VARIABLES, Recording, replace_atomically
+
+BLOCK = 25  # runs simulated, written and read at a time
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive runs; signals as in ``actuator.simulate``, and ``ambient_temperature`` (run,) in degC."""
+
+    first_run: int
+    interval: float  # s
+    signals: dict[str, np.ndarray]  # (run, time, phase) or (run, time)
+    faults: np.ndarray  # (run, 6)
+
+
+def shard_bounds(runs: int, shards: int, shard: int) -> tuple[int, int]:
+    """First run of a shard and the run after its last."""
+    return runs * shard // shards, runs * (shard + 1) // shards
+
+
+def sample_runs(spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Draw the run records of one part of a dataset.
+
+    Parameters
+    ----------
+    spec : the sub-tree ``config.dataset_spec``
+
+    Returns
+    -------
+    (run,) records of ``RUN_DTYPE`` and (run, 6) fault vectors
+    """
+    actuator = ActuatorParameters(**spec["actuator"])
+    ranges = spec["faults"]
+    units, repeats, seed = spec["runs"], spec["recordings_of_a_unit"], spec["seed"]
+    number = units * repeats
+    faults = sample_faults(
+        number,
+        shorted_turns=(ranges["N"]["low"], ranges["N"]["high"]),
+        eccentricity=(ranges["xi"]["low"], ranges["xi"]["high"]),
+        temperature=(ranges["dT"]["low"], ranges["dT"]["high"]),
+        scheme=spec["scheme"],
+        seed=seed,
+    )
+    if spec["healthy"]:
+        faults[:, :5] = 0.0
+    lag, angle = spec["magnet_lag"], spec["recording"]["theta_0"]
+    runs = make_runs(
+        actuator,
+        faults,
+        effects=spec["effects"],
+        eccentricity_law=ranges["law"],
+        dT_magnet=faults[:, 5] - np.random.default_rng([seed, 2]).uniform(lag["low"], lag["high"], number),
+        theta_0=np.random.default_rng([seed, 3]).uniform(angle["low"], angle["high"], number),
+    )
+    if spec["tolerance"]:
+        rng = np.random.default_rng([spec["unit_seed"], 4])
+        for effect in EFFECTS.values():
+            for name, parameter in effect.parameters.items():
+                if parameter.tolerance:
+                    spread = 1.0 + spec["tolerance"] * parameter.tolerance * rng.standard_normal(units)
+                    runs[effect.field(name)] *= np.repeat(spread, repeats)
+    return runs, faults
+
+
+def simulate_blocks(spec: Mapping[str, Any], first: int, last: int) -> Iterator[Block]:
+    """Simulate and measure runs ``first`` to ``last - 1`` of a part, block by block."""
+    from .actuator.commands import command_positions
+    from .actuator.sensors import SensorNoise, measure
+    from .actuator.simulate import simulate
+
+    recording, settings = spec["recording"], dict(spec["command"])
+    settings.pop("digest", None)
+    duration, interval = recording["duration"], recording["interval"]
+    command = command_positions(settings.pop("name"), settings, duration, spec["actuator"]["control_period"])
+    noise = SensorNoise(**spec["sensors"])
+    runs, faults = sample_runs(spec)
+    for start in range(first, last, BLOCK):
+        rows = slice(start, min(start + BLOCK, last))
+        clean = simulate(runs[rows], command, duration, interval)
+        signals = measure(clean, runs[rows], noise, spec["seed"], first_run=start)
+        yield Block(start, interval, signals, faults[rows])
+
+
+def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:
+    """Simulate one shard of a part and write it.
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    import netCDF4
+
+    first, last = shard_bounds(spec["runs"] * spec["recordings_of_a_unit"], spec["shards"], shard)
+    samples = round(spec["recording"]["duration"] / spec["recording"]["interval"])
+
+    def write(temporary: Path) -> None:
+        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+            _create(file, spec, last - first, samples)
+            file.setncatts({"first_run": first, "shard": shard})
+            blocks = simulate_blocks(spec, first, last)
+            for block in progress(blocks, f"simulate {Path(path).parent.name} {shard}", -(-(last - first) // BLOCK)):
+                rows = slice(block.first_run - first, block.first_run - first + len(block.faults))
+                for name, values in block.signals.items():
+                    file[name][rows] = values.swapaxes(1, 2) if values.ndim == 3 else values
+                file["fault"][rows] = block.faults
+
+    replace_atomically(Path(path), write)
+
+
+def _create(file, spec: Mapping[str, Any], runs: int, samples: int) -> None:
+    """Dimensions, variables and attributes of a shard; one chunk holds one signal of one run."""
+    for name, size in {"run": runs, "phase": 3, "time": samples, "component": 6}.items():
+        file.createDimension(name, size)
+    for name, labels in {"phase": PHASES, "component": FAULT_NAMES}.items():
+        variable = file.createVariable(name, str, (name,))
+        for j, label in enumerate(labels):
+            variable[j] = label
+    time = file.createVariable("time", "f8", ("time",))
+    time.units, time.long_name = "s", "end of each recording interval"
+    time[:] = spec["recording"]["interval"] * np.arange(1, samples + 1)
+    compression = {"compression": "zlib", "complevel": 1, "shuffle": True}
+    for name, (phased, unit, _, long_name) in VARIABLES.items():
+        dims, chunk = (("run", "phase", "time"), (1, 3, samples)) if phased else (("run", "time"), (1, samples))
+        variable = file.createVariable(name, "f4", dims, chunksizes=chunk, fill_value=False, **compression)
+        variable.units, variable.long_name = unit, long_name
+    ambient = file.createVariable("ambient_temperature", "f8", ("run",), fill_value=False)
+    ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
+    fault = file.createVariable("fault", "f8", ("run", "component"), fill_value=False)
+    fault.long_name = "fault vector; Na, Nb, Nc, xi_x, xi_y (1), dT (K)"
+    file.setncatts(
+        {
+            "title": "simulated recordings of an electromechanical actuator",
+            "Conventions": "CF-1.11",
+            "command": spec["command"]["name"],
+            "health": "healthy" if spec["healthy"] else "seeded",
+            "unit": "within tolerance" if spec["tolerance"] else "nominal",
+            "configuration": json.dumps(spec, sort_keys=True),
+            "software": f"emafault {__version__}",
+        }
+    )
+
+
+def read_blocks(paths: Sequence[str | Path], names: Sequence[str] | None = None) -> Iterator[Block]:
+    """Read shards block by block, float64, in the order of the files given.
+
+    Parameters
+    ----------
+    names : signals to read; None reads all
+
+    Raises
+    ------
+    InputError : a file that is missing, truncated or not a dataset
+    """
+    import netCDF4
+
+    for path in map(Path, paths):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        try:
+            with netCDF4.Dataset(path) as file:
+                missing = [n for n in ("time", "fault", "ambient_temperature", *VARIABLES) if n not in file.variables]
+                if missing or "run" not in file.dimensions:
+                    raise InputError(f"{path}: not a dataset of runs, {missing[0] if missing else 'run'} is missing")
+                file.set_auto_mask(False)
+                time = file["time"][:]
+                interval = float((time[-1] - time[0]) / (len(time) - 1))
+                first = int(file.getncattr("first_run"))
+                for start in range(0, len(file.dimensions["run"]), BLOCK):
+                    yield _read_block(file, slice(start, start + BLOCK), first + start, interval, names)
+        except (OSError, RuntimeError, AttributeError) as error:
+            raise InputError(f"{path}: not a readable dataset, damaged or of another kind ({error})") from error
+
+
+def _read_block(file, rows: slice, first_run: int, interval: float, names: Sequence[str] | None) -> Block:
+    signals = {}
+    for name in names or VARIABLES:
+        values = np.asarray(file[name][rows], dtype=float)
+        signals[name] = np.ascontiguousarray(values.swapaxes(1, 2)) if VARIABLES[name][0] else values
+    signals["ambient_temperature"] = np.asarray(file["ambient_temperature"][rows], dtype=float)
+    return Block(first_run, interval, signals, np.asarray(file["fault"][rows], dtype=float))
+
+
+def count_runs(paths: Sequence[str | Path]) -> int:
+    """Number of runs in shards.
+
+    Raises
+    ------
+    InputError : a file that cannot be read
+    """
+    import netCDF4
+
+    total = 0
+    for path in paths:
+        try:
+            with netCDF4.Dataset(path) as file:
+                total += len(file.dimensions["run"])
+        except (OSError, KeyError) as error:
+            raise InputError(f"{path}: not a readable dataset ({error})") from error
+    return total
+
+
+def read_run(paths: Sequence[str | Path], run: int) -> Recording:
+    """One run of a dataset as a recording; nothing else of the file is read.
+
+    Raises
+    ------
+    InputError : no such run
+    """
+    import netCDF4
+
+    for path in paths:
+        with netCDF4.Dataset(path) as file:
+            row = run - int(file.getncattr("first_run"))
+            if 0 <= row < len(file.dimensions["run"]):
+                file.set_auto_mask(False)
+                block = _read_block(file, slice(row, row + 1), run, 0.0, None)
+                signals = {name: values[0] for name, values in block.signals.items()}
+                attributes = {key: str(file.getncattr(key)) for key in ("command", "health", "unit")}
+                return Recording(
+                    time=file["time"][:], fault=block.faults[0], attributes=attributes, name=f"run {run}", **signals
+                )
+    raise InputError(f"run {run}: there is no such run in {', '.join(map(str, paths))}")
+
+
+def as_batch(recording: Recording) -> dict[str, np.ndarray]:
+    """Signals of one recording with a leading run axis of length one; what the recording lacks is absent."""
+    values = {name: getattr(recording, name) for name in VARIABLES}
+    signals = {name: np.asarray(v, dtype=float)[None] for name, v in values.items() if v is not None}
+    return signals | {"ambient_temperature": np.array([recording.ambient_temperature])}

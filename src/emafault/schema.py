@@ -1,0 +1,288 @@
+"""What a configuration may hold: one dataclass per group, each field with its unit and its accepted values.
+
+``check`` compares a composed configuration (plain dicts) with these and refuses what does not fit, naming the key, what
+it got and what it accepts.
+"""
+
+# ruff: noqa: RUF009  (a field with its accepted values is made by a function)
+
+import difflib
+import math
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
+from typing import Any
+
+from .actuator.parameters import ECCENTRICITY_LAWS, ActuatorParameters
+from .errors import InputError
+
+
+def number(low: float = -math.inf, high: float = math.inf, unit: str = "") -> Any:
+    """A number or an integer from ``low`` to ``high``, ends included."""
+    return field(metadata={"low": low, "high": high, "unit": unit})
+
+
+def choice(*accepted: str) -> Any:
+    """One of these words; any word if none is given."""
+    return field(metadata={"accepted": accepted})
+
+
+def group() -> Any:
+    """A group of its own."""
+    return field()
+
+
+#: smallest number that still counts as positive
+POSITIVE = 1e-12
+_MAY_BE_ZERO = {"viscous_friction", "coulomb_friction", "backlash", "switch_resistance", "diode_voltage"}
+_ANY_SIGN = {"reference_temperature"}
+
+
+def _actuator_field(name: str, kind: type) -> tuple[str, type, Any]:
+    low = -math.inf if name in _ANY_SIGN else 0.0 if name in _MAY_BE_ZERO else POSITIVE
+    return name, kind, number(1 if name in ("pole_pairs", "static_over_coulomb", "gear_ratio") else low)
+
+
+Actuator = make_dataclass("Actuator", [_actuator_field(f.name, f.type) for f in fields(ActuatorParameters)])  # type: ignore[arg-type]
+
+
+@dataclass
+class ShareRange:
+    low: float = number(0.0, 0.9)
+    high: float = number(0.0, 0.9)
+
+
+@dataclass
+class TemperatureRange:
+    low: float = number(-200.0, 500.0, "K")
+    high: float = number(-200.0, 500.0, "K")
+
+
+@dataclass
+class LagRange:
+    low: float = number(-500.0, 500.0, "K")
+    high: float = number(-500.0, 500.0, "K")
+
+
+@dataclass
+class AngleRange:
+    low: float = number(0.0, 2.0 * math.pi, "rad")
+    high: float = number(0.0, 2.0 * math.pi, "rad")
+
+
+@dataclass
+class Faults:
+    law: str = choice(*ECCENTRICITY_LAWS)
+    N: ShareRange = group()
+    xi: ShareRange = group()
+    dT: TemperatureRange = group()
+
+
+@dataclass
+class Magnet:
+    coefficient: float = number(-0.005, 0.005, "1/K")
+    lag: LagRange = group()
+
+
+@dataclass
+class Load:
+    constant: float = number(-1000.0, 1000.0, "N m")
+    spring: float = number(0.0, 10000.0, "N m/rad")
+
+
+@dataclass
+class RecordingConditions:
+    duration: float = number(0.2, 3600.0, "s")
+    discard: float = number(0.0, 3600.0, "s")
+    interval: float = number(1e-5, 1e-2, "s")
+    theta_0: AngleRange = group()
+
+
+@dataclass
+class Sensors:
+    voltage: float = number(0.0, 10.0, "V")
+    current: float = number(0.0, 10.0, "A")
+    current_end: float = number(0.0, 10.0, "A")
+    speed: float = number(0.0, 100.0, "rad/s")
+    angle: float = number(0.0, 1.0, "rad")
+    position: float = number(0.0, 1.0, "rad")
+    bus_voltage: float = number(0.0, 10.0, "V")
+    ambient: float = number(0.0, 50.0, "K")
+
+
+@dataclass
+class Unit:
+    tolerance: float = number(0.0, 4.0, "standard deviations")
+    training_tolerance: float = number(0.0, 4.0, "standard deviations")
+    reference_recordings: int = number(0, 8)
+
+
+@dataclass
+class Sampling:
+    scheme: str = choice("random", "sobol")
+    runs: int = number(20, 10_000_000)
+    fresh: int = number(10, 10_000_000)
+    seed: int = number(0, 2**31)
+    shards: int = number(1, 1000)
+
+
+@dataclass
+class Network:
+    layers: int = number(1, 3)
+    width: int = number(1, 256)
+    activation: str = choice("tanh", "sigmoid", "relu")
+    coordinates: str = choice("linear", "log")
+
+
+@dataclass
+class Training:
+    optimiser: str = choice("levenberg_marquardt", "adam")
+    train_fraction: float = number(0.1, 0.95)
+    validation_fraction: float = number(0.01, 0.5)
+    epochs: int = number(1, 1_000_000)
+    max_fail: int = number(1, 1_000_000)
+    weight_decay: float = number(0.0, 1e6)
+    reweight: int = number(0, 5)
+    learning_rate: float = number(POSITIVE, 10.0)
+    batch: int = number(1, 1_000_000)
+
+
+@dataclass
+class Search:
+    trials: int = number(0, 1_000_000)
+    workers: int = number(1, 64)
+    reconstruction: str = choice()
+    seed: int = number(0, 2**31)
+    storage: str | None = choice()
+
+
+@dataclass
+class Evaluation:
+    seeds: int = number(1, 100)
+    level: float = number(0.5, 0.999)
+
+
+@dataclass
+class Tracking:
+    uri: str = choice()
+    experiment: str = choice()
+
+
+_COMMANDS: dict[str, dict[str, tuple[float, float, str]]] = {
+    "parabolic": {"acceleration": (-100.0, 100.0, "rad/s2")},
+    "ramp": {"speed": (-10.0, 10.0, "rad/s")},
+    "step": {"amplitude": (-0.5, 0.5, "rad"), "time": (0.0, 3600.0, "s")},
+    "sine": {"amplitude": (-0.5, 0.5, "rad"), "frequency": (POSITIVE, 1000.0, "Hz")},
+    "chirp": {
+        "amplitude": (-0.5, 0.5, "rad"),
+        "frequency_start": (0.0, 1000.0, "Hz"),
+        "frequency_end": (0.0, 1000.0, "Hz"),
+    },
+    "reversal": {"amplitude": (POSITIVE, 0.5, "rad"), "speed": (POSITIVE, 10.0, "rad/s")},
+}
+#: settings that every entry of the group reconstruction has, whatever its method
+_WEIGHTED: list[tuple[str, Any, Any]] = [
+    ("discard", float, number(0.0, 3600.0, "s")),
+    ("margin", float, number(0.0, 89.0, "electrical degrees")),
+    ("plateau_width", float, number(30.0, 180.0, "electrical degrees")),
+    ("zero_current", float, number(0.0, 10.0, "A")),
+    ("floating", bool, group()),
+    ("noise", dict[str, float] | None, group()),
+]
+RECONSTRUCTIONS: dict[str, type] = {
+    "paper": make_dataclass(
+        "paper",
+        [
+            ("method", str, choice("paper")),
+            ("discard", float, number(0.0, 3600.0, "s")),
+            ("cutoff", float, number(POSITIVE, 1e5, "Hz")),
+            ("threshold", float, number(0.0, 10.0, "of k0")),
+            ("least_speed", float, number(POSITIVE, 1000.0, "rad/s")),
+        ],
+    ),
+    "weighted": make_dataclass("weighted", [("method", str, choice("weighted")), *_WEIGHTED]),
+}
+COMMANDS: dict[str, type] = {
+    name: make_dataclass(
+        name, [("name", str, choice(name)), *((key, float, number(*spec)) for key, spec in settings.items())]
+    )
+    for name, settings in _COMMANDS.items()
+}
+COMMANDS["file"] = make_dataclass("file", [("name", str, choice("file")), ("path", str)])
+
+
+def check(value: Any, schema: Any, key: str, metadata: Mapping = types.MappingProxyType({})) -> None:
+    """Refuse ``value`` unless it fits: a dataclass, number, bool, str, list[...], dict[str, ...], X | None or anything.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    origin, arguments = typing.get_origin(schema), typing.get_args(schema)
+    if is_dataclass(schema):
+        known = {f.name: f for f in fields(schema)}
+        if not isinstance(value, dict):
+            refuse(key, value, "keys " + ", ".join(known))
+        for name in value:
+            if name not in known:
+                raise InputError(unknown_key(name, key, known))
+        for name, f in known.items():
+            if name not in value:
+                raise InputError(f"{key}.{name}: is missing")
+            check(value[name], f.type, f"{key}.{name}" if key else name, f.metadata)
+        if {"low", "high"} <= known.keys() and value["low"] > value["high"]:
+            refuse(f"{key}.high", value["high"], f"a number not below {key}.low = {value['low']}")
+    elif origin in (types.UnionType, typing.Union):
+        if value is not None:
+            check(value, next(a for a in arguments if a is not types.NoneType), key, metadata)
+    elif origin is list:
+        if not isinstance(value, list):
+            refuse(key, value, "a list")
+        for position, item in enumerate(value):
+            check(item, arguments[0], f"{key}[{position}]", metadata)
+    elif origin is dict:
+        if not isinstance(value, dict):
+            refuse(key, value, "a mapping")
+        for name, item in value.items():
+            check(item, arguments[1], f"{key}.{name}", metadata)
+    elif schema is Any:
+        pass
+    elif schema is bool:
+        if not isinstance(value, bool):
+            refuse(key, value, "true or false")
+    elif schema in (int, float):
+        low, high = metadata.get("low", -math.inf), metadata.get("high", math.inf)
+        is_number = isinstance(value, int if schema is int else (int, float)) and not isinstance(value, bool)
+        if not (is_number and math.isfinite(value) and low <= value <= high):
+            refuse(key, value, _accepted_number(schema, low, high, metadata.get("unit", "")))
+    elif schema is str:
+        accepted = metadata.get("accepted")
+        if not isinstance(value, str) or not value or (accepted and value not in accepted):
+            refuse(key, value, ", ".join(accepted) if accepted else "a word")
+
+
+def refuse(key: str, got: Any, accepted: str) -> typing.NoReturn:
+    """Raise the one line that names a key, what it got and what it accepts."""
+    raise InputError(f"{key}: got {got!r}, accepted is {accepted}")
+
+
+def unknown_key(name: str, parent: str, known: Mapping | list[str]) -> str:
+    """The one line that refuses a key that does not exist."""
+    close = difflib.get_close_matches(str(name), list(known), 1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    full = f"{parent}.{name}" if parent else name
+    return f"{full}: there is no such key{hint}; {parent or 'the configuration'} accepts {', '.join(sorted(known))}"
+
+
+def _accepted_number(kind: type, low: float, high: float, unit: str) -> str:
+    word = "an integer" if kind is int else "a number"
+    if low == POSITIVE:
+        limits = "above 0" if high == math.inf else f"above 0, to {high:g}"
+    elif low == -math.inf and high == math.inf:
+        limits = ""
+    elif high == math.inf:
+        limits = f"from {low:g}"
+    else:
+        limits = f"from {low:g} to {high:g}"
+    return " ".join(part for part in (word, limits, f"({unit})" if unit else "") if part)
