@@ -1,7 +1,7 @@
 """Closed-form identification: the inverse of the fault laws, the baseline that any network must beat.
 
-Symbols: R_j (ohm) and k_j (V s/rad) are the generalised features, r_j = R_j/R0, q_j = k_j/k0, c = 1 + alpha dT (copper),
-m = 1 + alpha_m dT (magnets at the winding's temperature), alpha_j the phase axes (rad, electrical).
+Symbols: R_j (ohm) and k_j (V s/rad) are the generalised features, r_j = R_j/R0, q_j = k_j/k0, c = 1 + alpha dT
+(copper), m = 1 + alpha_m dT (magnets at the winding's temperature), alpha_j the phase axes (rad, electrical).
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Errors of identified faults: physical units, error over range, beside the Cramer-Rao bound, over seeds and estimators."""
+"""Errors of identified faults: in physical units, over range and beside the Cramer-Rao bound; over seeds, estimators."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -37,7 +37,9 @@ def fault_range(
     shorted_turns: tuple[float, float], eccentricity: tuple[float, float], temperature: tuple[float, float]
 ) -> np.ndarray:
     """Width (6,) of the range each component is sampled from; each xi spans twice the largest radius."""
-    return np.array([*[shorted_turns[1] - shorted_turns[0]] * 3, *[2.0 * eccentricity[1]] * 2, temperature[1] - temperature[0]])
+    return np.array(
+        [*[shorted_turns[1] - shorted_turns[0]] * 3, *[2.0 * eccentricity[1]] * 2, temperature[1] - temperature[0]]
+    )
 
 
 def errors(
@@ -53,9 +55,10 @@ def errors(
 
     Returns
     -------
-    output -> ``mae``, ``rmse``, ``bias``, ``worst`` in the component's unit, ``over_range`` (mae over width); with a bound also ``bound`` (the mean
-    absolute error of an estimator that attains it), ``ratio`` (mae over it) and ``below_bound`` (1 where the ratio lies below 1
-    by more than chance: a leak of something no recording tells); ``mean`` holds the mean ``over_range``
+    output -> ``mae``, ``rmse``, ``bias``, ``worst`` in the component's unit, ``over_range`` (mae over width); with
+    a bound also ``bound`` (the mean absolute error of an estimator that attains it), ``ratio`` (mae over it) and
+    ``below_bound`` (1 where the ratio lies below 1 by more than chance: a leak of something no recording tells);
+    ``mean`` holds the mean ``over_range``
     """
     error = np.asarray(estimate) - np.asarray(truth)
     groups = {name: (j,) for j, name in enumerate(FAULT_NAMES)} | GROUPS
@@ -83,7 +86,7 @@ def errors(
 
 
 def leaks(result: Mapping[str, Any]) -> list[str]:
-    """Outputs whose error lies below the bound by more than chance, in the result of :func:`errors` or :func:`evaluate`."""
+    """Outputs whose error lies below the bound by more than chance, from :func:`errors` or :func:`evaluate`."""
     table = result.get("errors", result)
     return [name for name, entry in table.items() if entry.get("below_bound")]
 
@@ -99,8 +102,8 @@ def evaluate(
 
     Returns
     -------
-    ``rows``, ``parameters``, ``errors`` (:func:`errors`), ``coverage`` of the intervals at ``level`` and their mean ``width``
-    by component
+    ``rows``, ``parameters``, ``errors`` (:func:`errors`), ``coverage`` of the intervals at ``level`` and their mean
+    ``width`` by component
     """
     value = identifier.predict(fresh.features, fresh.covariance, unit)
     low, high = identifier.interval(fresh.features, level, fresh.covariance, unit)
@@ -159,8 +162,8 @@ def compare(
 
     Returns
     -------
-    one dict for each method, estimator and seed: ``method``, ``estimator``, ``seed``, ``few`` and ``all`` (:func:`evaluate` on the few and on all fresh
-    rows), ``fit`` (the :class:`.identifier.Fit` itself)
+    one dict for each method, estimator and seed: ``method``, ``estimator``, ``seed``, ``few`` and ``all``
+    (:func:`evaluate` on the few and on all fresh rows), ``fit`` (the :class:`.identifier.Fit` itself)
     """
     table = []
     for method, known in training.items():
@@ -168,7 +171,9 @@ def compare(
         for name, make in estimators.items():
             for seed in seeds:
                 fit = make(known, seed)
-                pick = np.random.default_rng([seed, 30]).choice(len(new.faults), min(few, len(new.faults)), replace=False)
+                pick = np.random.default_rng([seed, 30]).choice(
+                    len(new.faults), min(few, len(new.faults)), replace=False
+                )
                 table.append(
                     {
                         "method": method,
@@ -189,7 +194,8 @@ def unit_tolerance(
 
     Parameters
     ----------
-    unit : (6,) or (run, 6) R (ohm) and k (V s/rad) of each healthy unit at 20 degC, as its reference record gives them
+    unit : (6,) or (run, 6) R (ohm) and k (V s/rad) of each healthy unit at 20 degC, as its reference record gives
+        them
 
     Returns
     -------

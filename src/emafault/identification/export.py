@@ -44,8 +44,8 @@ def export_onnx(network: Network, path: str | Path, check_on: np.ndarray) -> dic
 
     Returns
     -------
-    ``against_torch`` and ``against_float64``: largest absolute difference over any output divided by that output's scale
-    (its standard deviation in training); ``against_torch_<component>`` the same in SI units
+    ``against_torch`` and ``against_float64``: largest absolute difference over any output divided by that output's
+    scale (its standard deviation in training); ``against_torch_<component>`` the same in SI units
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A trained identification as one object: estimator, scaling and intervals, saved as one readable file beside its ONNX."""
+"""A trained identification as one object: estimator, scaling and intervals, saved as one readable file."""
 
 import json
 from collections.abc import Mapping
@@ -27,8 +27,9 @@ _FORMAT = 1
 class Identifier:
     """Features to faults with intervals; ``features`` are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c] or, where the
 
-    reconstruction measures xi by itself, (run, 8) with xi_x and xi_y behind them. A ``unit`` is the (6,) or (run, 6) array of R and k of
-    the healthy unit at 20 degC: features and covariance are scaled to the nominal actuator before use.
+    reconstruction measures xi by itself, (run, 8) with xi_x and xi_y behind them. A ``unit`` is the (6,) or (run,
+    6) array of R and k of the healthy unit at 20 degC: features and covariance are scaled to the nominal actuator
+    before use.
     """
 
     actuator: ActuatorParameters
@@ -69,7 +70,8 @@ class Identifier:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Low and high end (run, 6) of the prediction interval at ``level``.
 
-        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it the calibration rows' is taken.
+        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it the calibration rows' is
+        taken.
         """
         features, covariance = self._nominal(features, covariance, unit)
         value = _estimate(self, features, covariance)
@@ -99,7 +101,9 @@ class Identifier:
         if self.feature_low is None or self.feature_high is None:
             return np.zeros(len(features))
         x, _ = self._nominal(features, None, unit)
-        beyond = np.maximum(self.feature_low - x, x - self.feature_high) / (self.feature_high - self.feature_low + 1e-30)
+        beyond = np.maximum(self.feature_low - x, x - self.feature_high) / (
+            self.feature_high - self.feature_low + 1e-30
+        )
         return np.maximum(beyond.max(axis=1), 0.0)
 
     def _nominal(self, features, covariance, unit) -> tuple[np.ndarray, np.ndarray | None]:
@@ -190,7 +194,9 @@ def _variance(identifier: Identifier, features: np.ndarray, covariance: np.ndarr
         for j in range(6):
             step = np.zeros(features.shape)
             step[:, j] = 1e-5 * features[:, j]
-            change = _estimate(identifier, features + step, covariance) - _estimate(identifier, features - step, covariance)
+            change = _estimate(identifier, features + step, covariance) - _estimate(
+                identifier, features - step, covariance
+            )
             columns.append(change / (2.0 * step[:, j : j + 1]))
         derivative = np.stack(columns, axis=-1)
     return np.einsum("npi,nij,npj->np", derivative, covariance, derivative)
@@ -225,7 +231,8 @@ def fit_identifier(
     estimator : ``network`` or ``closed_form``
     features : (run, 6) or (run, 8); faults : (run, 6)
     covariance : (run, 6, 6) of R and k, to normalise the intervals; None where the reconstruction gives none
-    intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the 70/15/15 calibrates)
+    intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the
+        70/15/15 calibrates)
 
     Raises
     ------
@@ -239,9 +246,7 @@ def fit_identifier(
     if covariance is not None and not np.all(np.isfinite(covariance)):
         covariance = None
     placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
-    identifier = Identifier(
-        actuator, alpha_m, placeholder, None, features.min(axis=0), features.max(axis=0)
-    )
+    identifier = Identifier(actuator, alpha_m, placeholder, None, features.min(axis=0), features.max(axis=0))
     trained = None
     if estimator == "network":
         trained = train(features, faults, network, training, seed)

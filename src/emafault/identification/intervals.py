@@ -1,11 +1,13 @@
 """Prediction intervals by conformal prediction, normalised by the propagated noise of the features.
 
-The score of a calibration row and output is |error| / scale. The scale is what the noise of the features makes of the estimate,
-J covariance J', plus a constant variance for what the estimator itself misses: a network's approximation, or magnets whose
-temperature no feature tells. Rows must not have been trained on: the residuals come from cross-conformal folds, each predicted
-by a network trained without it (Vovk 2015, doi:10.1007/s10472-013-9368-4), or from a held-out split. A half width is the ceil((n + 1) level)-th smallest
-score times the scale, about the prediction of the network trained on all parts. For ``split`` coverage is at least the level on
-average over exchangeable rows; for ``cross`` that is approximate, slightly wide since fold networks see fewer rows.
+The score of a calibration row and output is |error| / scale. The scale is what the noise of the features makes of
+the estimate, J covariance J', plus a constant variance for what the estimator itself misses: a network's
+approximation, or magnets whose temperature no feature tells. Rows must not have been trained on: the residuals come
+from cross-conformal folds, each predicted by a network trained without it (Vovk 2015,
+doi:10.1007/s10472-013-9368-4), or from a held-out split. A half width is the ceil((n + 1) level)-th smallest score
+times the scale, about the prediction of the network trained on all parts. For ``split`` coverage is at least the
+level on average over exchangeable rows; for ``cross`` that is approximate, slightly wide since fold networks see
+fewer rows.
 """
 
 from dataclasses import dataclass
@@ -48,7 +50,9 @@ class ConformalIntervals:
         n = len(self.scores)
         rank = int(np.ceil((n + 1) * level))
         if not 0.0 < level < 1.0 or rank > n:
-            raise InputError(f"level: got {level}, accepted is above 0, up to {n / (n + 1):.4f} with {n} calibration rows")
+            raise InputError(
+                f"level: got {level}, accepted is above 0, up to {n / (n + 1):.4f} with {n} calibration rows"
+            )
         if variance is None:
             variance = np.broadcast_to(self.typical_variance, (rows, self.scores.shape[1]))
         variance = np.where(np.isfinite(variance), variance, self.typical_variance)

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt training of small dense networks, full batch, with early stopping as in MATLAB's trainlm.
 
-The residuals of row n and output o are e = y - t. The derivative by the weight W_l[h, i] is delta_l[n, o, h] a_{l-1}[n, i]
-with delta the backpropagated derivative of output o and a the layer's input (1 appended for the bias), so that blocks of J'J are
-contractions over n of two small products and the Jacobian itself is never formed.
+The residuals of row n and output o are e = y - t. The derivative by the weight W_l[h, i] is delta_l[n, o, h]
+a_{l-1}[n, i] with delta the backpropagated derivative of output o and a the layer's input (1 appended for the
+bias), so that blocks of J'J are contractions over n of two small products and the Jacobian itself is never formed.
 """
 
 from collections.abc import Callable
@@ -34,8 +34,7 @@ class LearningCurve:
 def initialise(sizes: tuple[int, ...], rng: np.random.Generator) -> Weights:
     """Small random weights (Glorot-scaled normal, zero biases) of a network with the given layer sizes."""
     return [
-        np.hstack([rng.normal(0.0, np.sqrt(1.0 / i), (o, i)), np.zeros((o, 1))])
-        for i, o in zip(sizes[:-1], sizes[1:])
+        np.hstack([rng.normal(0.0, np.sqrt(1.0 / i), (o, i)), np.zeros((o, 1))]) for i, o in zip(sizes[:-1], sizes[1:])
     ]
 
 

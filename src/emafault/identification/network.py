@@ -12,7 +12,7 @@ from .settings import NetworkSettings
 
 @dataclass(frozen=True)
 class Scaler:
-    """Coordinates of the features (linear, or the log of R and k), then standardisation; targets are standardised too."""
+    """Coordinates of the features (linear, or the log of R and k), standardised; standardised targets."""
 
     coordinates: str
     feature_mean: np.ndarray  # (feature,)
@@ -56,7 +56,9 @@ def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
     if np.any(np.real(features[:, :6]) <= 0.0):
         row, column = np.argwhere(np.real(features[:, :6]) <= 0.0)[0]
         name = ("R_a", "R_b", "R_c", "k_a", "k_b", "k_c")[column]
-        raise InputError(f"features: {name} of run {row} is {np.real(features[row, column]):.4g}, accepted are values above 0")
+        raise InputError(
+            f"features: {name} of run {row} is {np.real(features[row, column]):.4g}, accepted are values above 0"
+        )
     return np.concatenate([np.log(features[:, :6]), features[:, 6:]], axis=1)
 
 
@@ -79,8 +81,8 @@ class Network:
 
     def to_plain(self) -> dict[str, Any]:
         """Everything as plain lists; numbers survive JSON exactly."""
-        scaler = {key: value if isinstance(value, str) else value.tolist() for key, value in vars(self.scaler).items()}
-        return {
+        scaler = {key: value if isinstance(value, str) else value.tolist() for key, value in
+        vars(self.scaler).items()} return {
             "settings": self.settings.as_dict(),
             "scaler": scaler,
             "weights": [W.tolist() for W in self.weights],
@@ -89,7 +91,5 @@ class Network:
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "Network":
         """The inverse of :meth:`to_plain`."""
-        scaler = {key: value if isinstance(value, str) else np.array(value) for key, value in plain["scaler"].items()}
-        return cls(
-            NetworkSettings.of(plain["settings"]), Scaler(**scaler), [np.array(W) for W in plain["weights"]]
-        )
+        scaler: dict[str, Any] = {key: value if isinstance(value, str) else np.array(value) for key, value in plain["scaler"].items()}
+        return cls(NetworkSettings.of(plain["settings"]), Scaler(**scaler), [np.array(W) for W in plain["weights"]])

@@ -59,8 +59,8 @@ def _converted(name: str, value: Any, kind: Any) -> Any:
 class NetworkSettings(_Settings):
     """Shape of a network; the defaults are the paper's 6-12-6 with tanh on standardised features.
 
-    ``coordinates`` are those of R and k before they are standardised: ``log`` turns the products of the fault laws into
-    sums, which a small network meets with fewer units.
+    ``coordinates`` are those of R and k before they are standardised: ``log`` turns the products of the fault laws
+    into sums, which a small network meets with fewer units.
     """
 
     section = "network"
@@ -89,8 +89,8 @@ class NetworkSettings(_Settings):
 class TrainingSettings(_Settings):
     """How a network is trained; the defaults are the paper's.
 
-    ``reweight`` counts further passes in which the residuals are whitened by their own covariance, the maximum-likelihood fit of
-    outputs whose errors differ in size and are correlated (as those of N_j and dT are).
+    ``reweight`` counts further passes in which the residuals are whitened by their own covariance, the
+    maximum-likelihood fit of outputs whose errors differ in size and are correlated (as those of N_j and dT are).
     """
 
     section = "training"
@@ -108,7 +108,11 @@ class TrainingSettings(_Settings):
         self._require("optimiser", self.optimiser in OPTIMISERS, f"are {', '.join(OPTIMISERS)}")
         self._require("train_fraction", 0.0 < self.train_fraction < 1.0, "is a fraction between 0 and 1")
         rest = 1.0 - self.train_fraction
-        self._require("validation_fraction", 0.0 < self.validation_fraction <= rest + 1e-9, "is above 0, at most 1 - train_fraction")
+        self._require(
+            "validation_fraction",
+            0.0 < self.validation_fraction <= rest + 1e-9,
+            "is above 0, at most 1 - train_fraction",
+        )
         for key in ("epochs", "max_fail", "batch"):
             self._require(key, getattr(self, key) >= 1, "is 1 or more")
         self._require("weight_decay", self.weight_decay >= 0.0, "is 0 or more")

@@ -126,7 +126,8 @@ def _train_adam(
 ) -> tuple[Weights, LearningCurve]:
     """Adam in shuffled batches with a cosine fall of the learning rate; the weights of the best validation epoch.
 
-    An epoch is ten passes over the rows, so that ``epochs`` and ``max_fail`` cost about what they do with Levenberg-Marquardt.
+    An epoch is ten passes over the rows, so that ``epochs`` and ``max_fail`` cost about what they do with
+    Levenberg-Marquardt.
     """
     import torch
 
@@ -166,5 +167,3 @@ def _train_adam(
                 optimiser.step()
         schedule.step()
     return best, curve
-
-

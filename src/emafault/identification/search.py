@@ -1,0 +1,317 @@
+"""Search over network size and training with Optuna: two objectives, several workers on one storage, resumable.
+
+Given the seed, one worker from an empty storage proposes the same trials each time; with several workers, or after
+a kill, what a sampler has seen depends on which trial ended first, so that repetition is best effort. A trial's own
+result does not: it depends on its settings and the seed alone.
+"""
+
+import hashlib
+import json
+import os
+import socket
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .settings import NetworkSettings, TrainingSettings
+from .training import train
+
+#: a trial of another host counts as abandoned after this long (s); on this host its process is asked for
+ABANDONED_AFTER = 600.0
+SAMPLERS = ("tpe", "nsga2")
+#: proposals of settings already tried that are refused in a row before one is taken, as it must be in a small space
+_REPEATS = 20
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """What is searched and how.
+
+    ``space`` maps ``network.<key>`` or ``training.<key>`` (the keys of :mod:`.settings`) to a list of values, or to
+    a range {low, high} with an optional ``log`` or ``step``; what is not named keeps ``network`` and ``training``.
+    """
+
+    space: Mapping[str, Any]
+    trials: int = 40
+    sampler: str = "tpe"
+    repeats: int = 2  # splits and starts averaged in one trial
+    seed: int = 0
+    network: Mapping[str, Any] = field(default_factory=dict)
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.sampler not in SAMPLERS:
+            raise InputError(f"search.sampler: got '{self.sampler}', accepted are {', '.join(SAMPLERS)}")
+        if self.trials < 1 or self.repeats < 1:
+            raise InputError(f"search: got trials {self.trials} and repeats {self.repeats}, accepted is 1 or more")
+        if not self.space:
+            raise InputError("search.space: is empty, accepted are keys of network. and training.")
+        for corner in ("low", "high"):  # refuse an impossible space before anything runs
+            self.settings({key: _corner(key, spec, corner) for key, spec in self.space.items()})
+
+    def settings(self, values: Mapping[str, Any]) -> tuple[NetworkSettings, TrainingSettings]:
+        """Network and training settings of one point of the space.
+
+        Raises
+        ------
+        InputError : a key that is neither of the network nor of the training
+        """
+        parts: dict[str, dict[str, Any]] = {"network": dict(self.network), "training": dict(self.training)}
+        for key, value in values.items():
+            section, _, name = key.partition(".")
+            if section not in parts or not name:
+                raise InputError(f"search.space.{key}: not known, accepted are network.<key> and training.<key>")
+            parts[section][name] = value
+        return NetworkSettings.of(parts["network"]), TrainingSettings.of(parts["training"])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One finished trial: its settings, the held-out error over range and the number of weights."""
+
+    number: int
+    error: float
+    parameters: int
+    network: dict[str, Any]
+    training: dict[str, Any]
+    seconds: float
+    pareto: bool = False
+
+
+def _corner(key: str, spec: Any, corner: str) -> Any:
+    if isinstance(spec, Mapping):
+        if not {"low", "high"} <= spec.keys() <= {"low", "high", "log", "step"}:
+            raise InputError(f"search.space.{key}: got {dict(spec)}, accepted are low, high, log and step")
+        if not spec["low"] <= spec["high"]:
+            raise InputError(f"search.space.{key}: low {spec['low']} is above high {spec['high']}")
+        return spec[corner]
+    if isinstance(spec, str) or not isinstance(spec, Sequence) or not spec:
+        raise InputError(f"search.space.{key}: got {spec!r}, accepted are a list of values or {{low, high}}")
+    return spec[0 if corner == "low" else -1]
+
+
+def _suggest(trial, key: str, spec: Any) -> Any:
+    if not isinstance(spec, Mapping):
+        return trial.suggest_categorical(key, list(spec))
+    low, high, log, step = spec["low"], spec["high"], bool(spec.get("log")), spec.get("step")
+    if isinstance(low, int) and isinstance(high, int):
+        return trial.suggest_int(key, low, high, step=step or 1, log=log)
+    return trial.suggest_float(key, low, high, step=step, log=log)
+
+
+def study_name(settings: SearchSettings, features: np.ndarray, faults: np.ndarray, width: np.ndarray) -> str:
+    """Name of the study: a digest of everything that a trial's result depends on, so not of the number of trials."""
+    plain = {key: value for key, value in asdict(settings).items() if key not in ("trials", "sampler")}
+    digest = hashlib.sha256(json.dumps(plain, sort_keys=True, default=str).encode())
+    for array in (features, faults, width):
+        digest.update(np.ascontiguousarray(array, float).tobytes())
+    return f"network-{digest.hexdigest()[:16]}"
+
+
+def open_study(storage: str | Path, name: str, sampler: Any = None):
+    """Open or create the study.
+
+    Parameters
+    ----------
+    storage : a file (the journal, also for several workers) or a database URL such as ``sqlite:///search.db``
+
+    Raises
+    ------
+    InputError : the storage cannot be opened
+    """
+    import optuna
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    if "://" in str(storage):
+        target: Any = str(storage)
+    else:
+        path = Path(storage).resolve()  # the lock misbehaves on relative paths
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # an open lock, since the symbolic one judges its age by the journal's; writes take milliseconds
+            lock = JournalFileOpenLock(str(path), grace_period=10)
+            _mend(path, lock)
+            target = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))
+        except OSError as error:
+            raise InputError(f"{path}: the search cannot be stored ({error.strerror or error})") from error
+    try:
+        return optuna.create_study(
+            storage=target,
+            study_name=name,
+            directions=["minimize", "minimize"],
+            sampler=sampler,
+            load_if_exists=True,
+        )
+    except (ValueError, OSError, ImportError) as error:
+        raise InputError(f"{storage}: not a usable search storage ({error})") from error
+    except Exception as error:  # what a database driver raises depends on the database
+        if type(error).__module__.split(".")[0] not in ("sqlalchemy", "optuna"):
+            raise
+        raise InputError(f"{storage}: not a usable search storage ({str(error).splitlines()[0]})") from error
+
+
+def _mend(path: Path, lock) -> None:
+    """Cut off a last line that a killed worker left unfinished: the next one appended would be lost with it."""
+    if not path.exists() or path.stat().st_size == 0:
+        return
+    with open(path, "r+b") as file:
+        file.seek(-1, os.SEEK_END)
+        if file.read(1) == b"\n":
+            return
+        lock.acquire()
+        try:
+            file.seek(0)
+            data = file.read()
+            file.truncate(data.rfind(b"\n") + 1)
+        finally:
+            lock.release()
+
+
+def _process(pid: int) -> str | None:
+    """What tells a process from a later one of the same number, its start where the system shows it; None if gone."""
+    try:
+        os.kill(pid, 0)
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
+    except ProcessLookupError:
+        return None
+    except OSError:
+        return "alive"
+
+
+def _running(trial) -> bool:
+    """Whether another process still runs a trial; one worker runs its trials one after the other."""
+    owner = trial.user_attrs.get("owner")
+    age = (datetime.now() - trial.datetime_start).total_seconds() if trial.datetime_start else 0.0
+    if owner is None:  # killed between asking for the trial and signing it
+        return age < 10.0
+    host, pid, process = owner
+    if host == socket.gethostname():
+        return pid != os.getpid() and _process(pid) == process
+    return age < ABANDONED_AFTER
+
+
+def _bury_abandoned(study) -> None:
+    from optuna.trial import TrialState
+
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+        if not _running(trial):
+            try:
+                study.tell(trial.number, state=TrialState.FAIL)
+            except (ValueError, RuntimeError):  # another worker was first
+                pass
+
+
+def trial_error(
+    settings: SearchSettings, values: Mapping[str, Any], features: np.ndarray, faults: np.ndarray, width: np.ndarray
+) -> tuple[float, int]:
+    """Held-out error over range, of rows neither trained on nor used for stopping, and the number of weights."""
+    network, training = settings.settings(values)
+    shares = []
+    for repeat in range(settings.repeats):
+        model = train(features, faults, network, training, seed=settings.seed + 7919 * repeat)
+        rows = model.test_rows if len(model.test_rows) else model.validation_rows
+        residual = np.abs(model.network.predict(features[rows]) - faults[rows])
+        used = width > 0.0
+        shares.append(float(np.mean(residual[:, used] / width[used])))
+    return float(np.mean(shares)), model.network.parameters
+
+
+def run_worker(
+    storage: str | Path,
+    settings: SearchSettings,
+    features: np.ndarray,
+    faults: np.ndarray,
+    width: np.ndarray,
+    worker: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Run trials until the study holds the asked number of finished ones, together with any other workers.
+
+    Parameters
+    ----------
+    storage : see :func:`open_study`
+    features, faults : (run, feature), (run, 6) training rows, the same for all workers
+    width : (6,) what errors are divided by, see ``evaluation.fault_range``
+    worker : number of this worker; part of its sampler's seed
+    progress : called with (finished, asked)
+
+    Returns
+    -------
+    number of trials that this worker ran
+    """
+    import optuna
+    from optuna.trial import TrialState
+
+    name = study_name(settings, features, faults, width)
+    study = open_study(storage, name)
+    seen = len(study.get_trials(deepcopy=False))  # a resumed worker must not propose again what it did
+    seed = int(np.random.SeedSequence([settings.seed, worker, seen]).generate_state(1)[0])
+    if settings.sampler == "tpe":
+        study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True, multivariate=True)
+    else:
+        study.sampler = optuna.samplers.NSGAIISampler(seed=seed, population_size=max(4, min(20, settings.trials // 3)))
+    done_here, repeated = 0, 0
+    while True:
+        _bury_abandoned(study)
+        trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.RUNNING))
+        complete = sum(t.state == TrialState.COMPLETE for t in trials)
+        if progress:
+            progress(complete, settings.trials)
+        if complete >= settings.trials:
+            return done_here
+        if len(trials) >= settings.trials:
+            time.sleep(0.2)  # the last ones run elsewhere; should that worker die, they are run here
+            continue
+        trial = study.ask()
+        trial.set_user_attr("owner", [socket.gethostname(), os.getpid(), _process(os.getpid())])
+        values = {key: _suggest(trial, key, spec) for key, spec in sorted(settings.space.items())}
+        twin = next((t for t in trials if t.params == values), None)
+        if twin is not None and repeated < _REPEATS:
+            study.tell(trial, state=TrialState.FAIL)  # samplers pass over these, and they do not count
+            repeated += 1
+            continue
+        repeated = 0
+        known = twin.values if twin is not None and twin.state == TrialState.COMPLETE else None
+        study.tell(trial, known or trial_error(settings, values, features, faults, width))
+        done_here += 1
+
+
+def summarise(
+    storage: str | Path, settings: SearchSettings, features: np.ndarray, faults: np.ndarray, width: np.ndarray
+) -> list[Trial]:
+    """Finished trials in the order of their numbers, at most the asked number, those on the Pareto front marked."""
+    from optuna.trial import TrialState
+
+    study = open_study(storage, study_name(settings, features, faults, width))
+    finished = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))[: settings.trials]
+    points = [(t.values[0], int(t.values[1])) for t in finished]
+    out: list[Trial] = []
+    for trial, (error, parameters) in zip(finished, points):
+        beaten = any(e <= error and p <= parameters and (e, p) != (error, parameters) for e, p in points)
+        beaten = beaten or (error, parameters) in points[: len(out)]  # of equals the first
+        network, training = settings.settings(trial.params)
+        seconds = trial.duration.total_seconds() if trial.duration else float("nan")
+        out.append(Trial(trial.number, error, parameters, network.as_dict(), training.as_dict(), seconds, not beaten))
+    return out
+
+
+def choose(trials: Sequence[Trial], tolerance: float = 0.05) -> Trial:
+    """The smallest network whose error is within ``tolerance`` (a fraction) of the best; of equals the more accurate.
+
+    Raises
+    ------
+    InputError : no finished trial
+    """
+    if not trials:
+        raise InputError("search: no trial has finished, nothing can be chosen")
+    best = min(trial.error for trial in trials)
+    good = [trial for trial in trials if trial.error <= best * (1.0 + tolerance)]
+    return min(good, key=lambda trial: (trial.parameters, trial.error, trial.number))
