@@ -148,6 +148,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     while cell + 1 < cells and poles * theta - turns * TWO_PI >= edge[cell + 1]:
         cell += 1
     diode = 0  # of the off phase: +1 lower (i > 0), -1 upper (i < 0), 0 floating
+    keep_floating = False
     # ---- accumulators of the recording interval
     sum_i, sum_Ri, sum_e, start_flux = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     start_theta, start_filtered, sum_bus = theta, 0.0, 0.0
@@ -219,7 +220,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         Kp, Km, Ko = kp * Kp, km * Km, ko * Ko
         dKp, dKm, dKo = kp * dKp, km * dKm, ko * dKo
         # ---- star network: which phases conduct, first derivatives of the currents
-        if diode == 0 and abs(w) * largest_k > 0.15 * V:
+        if diode == 0 and not keep_floating and abs(w) * largest_k > 0.15 * V:
             star = 0.5 * (vp + vm - (Kp + Km) * w)
             if saturation == 0.0:
                 xp, xm = vp - Kp * w - Rp * ip, vm - Km * w - Rm * im
@@ -252,6 +253,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             drive_1 -= p.cogging_a * COGGING_ORDER * w * np.cos(COGGING_ORDER * theta)
         load = p.load_constant_T + p.load_spring_c * shaft
         twist = twist_1 = shaft_torque = 0.0
+        side = 0
         if compliant:
             twist = (theta - p.theta_0) / ratio - shaft
             twist_1 = w / ratio - w_shaft
@@ -338,8 +340,9 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             if te <= h:
                 h, event = te, 2
             elif io == 0.0 and y1o * diode <= 0.0:
-                diode = 0  # pushed back at once: it stays floating
+                diode, keep_floating = 0, True  # pushed back at once
                 continue
+        keep_floating = False
         if moving != 0:
             if moving > 0:
                 ahead = (edge[cell + 1] if cell + 1 < cells else edge[0] + TWO_PI) - edge[cell]
@@ -367,17 +370,26 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 if te < h:
                     h, event = te, 6
         if compliant:
+            # the sign of the rate decides at the very edge of the play, where rounding would flip the contact to and fro
             if contact != 0:
-                te = crossing(twist - contact * half_play, twist_1, 0.5 * twist_2, 0.0, 0.0, h)
-                if te < h:
-                    h, event = te, 7
+                gap, gap_1, gap_2 = contact * twist - half_play, contact * twist_1, 0.5 * contact * twist_2
+                if gap > 0.0:
+                    te = crossing(gap, gap_1, gap_2, 0.0, 0.0, h)
+                    if te < h:
+                        h, event = te, 7
+                elif gap_1 < 0.0:
+                    contact = 0
+                    continue
             else:
-                te = crossing(twist - half_play, twist_1, 0.5 * twist_2, 0.0, 0.0, h)
-                if te < h:
-                    h, event = te, 8
-                te = crossing(twist + half_play, twist_1, 0.5 * twist_2, 0.0, 0.0, h)
-                if te < h:
-                    h, event = te, 9
+                side = 1 if twist_1 >= 0.0 else -1
+                gap, gap_1, gap_2 = side * twist - half_play, side * twist_1, 0.5 * side * twist_2
+                if gap < 0.0:
+                    te = crossing(gap, gap_1, gap_2, 0.0, 0.0, h)
+                    if te < h:
+                        h, event = te, 8
+                elif gap_1 > 0.0:
+                    contact = side
+                    continue
         if diode == 0 and abs(w) * largest_k > 0.15 * V:
             # a floating terminal may reach a rail inside the segment: its drift is slow, one secant is exact enough
             later = w + a * h
@@ -469,9 +481,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         elif event == 7:
             contact = 0
         elif event == 8:
-            contact = 1
-        elif event == 9:
-            contact = -1
+            contact = side
         if moving * w < 0.0:
             w, moving = 0.0, 0
         if not compliant:
