@@ -1,4 +1,4 @@
-"""Errors of identified faults: in physical units, over range and beside the Cramer-Rao bound; over seeds, estimators."""
+"""Errors of identified faults: in physical units, over range and beside the Cramer-Rao bound, over seeds."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..faults import FAULT_NAMES
 from .identifier import Fit, Identifier
 from .intervals import coverage
@@ -102,13 +103,20 @@ def evaluate(
 
     Returns
     -------
-    ``rows``, ``parameters``, ``errors`` (:func:`errors`), ``coverage`` of the intervals at ``level`` and their mean
-    ``width`` by component
+    ``rows`` evaluated, ``unidentified`` rows left out because their record gave no features, ``parameters``,
+    ``errors`` (:func:`errors`), ``coverage`` of the intervals at ``level`` and their mean ``width`` by component
     """
+    identified = np.all(np.isfinite(fresh.features), axis=1)
+    if not np.any(identified):
+        raise InputError("evaluation: no run has features to identify from; a motion of one electrical turn is needed")
+    if not np.all(identified):
+        fresh = fresh.rows(identified)
+        unit = unit if unit is None or np.ndim(unit) == 1 else np.asarray(unit)[identified]
     value = identifier.predict(fresh.features, fresh.covariance, unit)
     low, high = identifier.interval(fresh.features, level, fresh.covariance, unit)
     return {
         "rows": len(value),
+        "unidentified": int(np.sum(~identified)),
         "parameters": identifier.parameters,
         "errors": errors(value, fresh.faults, width, fresh.bound),
         "coverage": coverage(low, high, fresh.faults),

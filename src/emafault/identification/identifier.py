@@ -226,6 +226,8 @@ def fit_identifier(
 ) -> Fit:
     """Train an estimator and calibrate its intervals on rows that it, or the network of their fold, was not trained on.
 
+    Rows whose record gave no features (NaN) are left out.
+
     Parameters
     ----------
     estimator : ``network`` or ``closed_form``
@@ -243,6 +245,12 @@ def fit_identifier(
     if intervals not in ("cross", "split"):
         raise InputError(f"intervals: got '{intervals}', accepted are cross and split")
     features, faults = np.asarray(features, float), np.asarray(faults, float)
+    identified = np.all(np.isfinite(features), axis=1)
+    if not np.all(identified):
+        features, faults = features[identified], faults[identified]
+        covariance = None if covariance is None else covariance[identified]
+    if len(features) < 10:
+        raise InputError(f"identification: {len(features)} runs have features, at least 10 are needed to learn from")
     if covariance is not None and not np.all(np.isfinite(covariance)):
         covariance = None
     placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))

@@ -65,7 +65,8 @@ class ConformalIntervals:
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "ConformalIntervals":
         """The inverse of :meth:`to_plain`."""
-        return cls(**{key: value if isinstance(value, str) else np.array(value) for key, value in plain.items()})
+        arrays = {key: np.array(value) for key, value in plain.items() if key != "method"}
+        return cls(plain["method"], **arrays)
 
 
 def coverage(low: np.ndarray, high: np.ndarray, truth: np.ndarray) -> dict[str, float]:

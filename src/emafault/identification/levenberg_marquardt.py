@@ -7,6 +7,7 @@ bias), so that blocks of J'J are contractions over n of two small products and t
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -33,9 +34,7 @@ class LearningCurve:
 
 def initialise(sizes: tuple[int, ...], rng: np.random.Generator) -> Weights:
     """Small random weights (Glorot-scaled normal, zero biases) of a network with the given layer sizes."""
-    return [
-        np.hstack([rng.normal(0.0, np.sqrt(1.0 / i), (o, i)), np.zeros((o, 1))]) for i, o in zip(sizes[:-1], sizes[1:])
-    ]
+    return [np.hstack([rng.normal(0.0, np.sqrt(1.0 / i), (o, i)), np.zeros((o, 1))]) for i, o in pairwise(sizes)]
 
 
 def outputs(weights: Weights, activation: str, x: np.ndarray) -> np.ndarray:

@@ -81,8 +81,8 @@ class Network:
 
     def to_plain(self) -> dict[str, Any]:
         """Everything as plain lists; numbers survive JSON exactly."""
-        scaler = {key: value if isinstance(value, str) else value.tolist() for key, value in
-        vars(self.scaler).items()} return {
+        scaler = {key: value.tolist() for key, value in vars(self.scaler).items() if key != "coordinates"}
+        return {
             "settings": self.settings.as_dict(),
             "scaler": scaler,
             "weights": [W.tolist() for W in self.weights],
@@ -91,5 +91,6 @@ class Network:
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "Network":
         """The inverse of :meth:`to_plain`."""
-        scaler: dict[str, Any] = {key: value if isinstance(value, str) else np.array(value) for key, value in plain["scaler"].items()}
-        return cls(NetworkSettings.of(plain["settings"]), Scaler(**scaler), [np.array(W) for W in plain["weights"]])
+        settings = NetworkSettings.of(plain["settings"])
+        scaler = Scaler(settings.coordinates, **{key: np.array(value) for key, value in plain["scaler"].items()})
+        return cls(settings, scaler, [np.array(W) for W in plain["weights"]])

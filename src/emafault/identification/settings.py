@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
 from typing import Any, Self
 
 from ..errors import InputError
@@ -27,7 +28,7 @@ class _Settings:
         if isinstance(values, cls):
             return values
         accepted = {f.name: f for f in fields(cls)}  # type: ignore[arg-type]
-        given = dict(values or {})  # type: ignore[call-overload]
+        given: dict[str, Any] = dict(values or {})  # type: ignore[arg-type]
         for key, value in given.items():
             if key not in accepted:
                 raise InputError(f"{cls.section}.{key}: not known, accepted are {', '.join(accepted)}")
@@ -82,7 +83,7 @@ class NetworkSettings(_Settings):
     def parameters(self, inputs: int = 6, outputs: int = 6) -> int:
         """Number of weights and biases."""
         sizes = self.sizes(inputs, outputs)
-        return sum((i + 1) * o for i, o in zip(sizes[:-1], sizes[1:]))
+        return sum((i + 1) * o for i, o in pairwise(sizes))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,67 @@
+"""Evaluation: metrics by hand, leaks flagged, methods and estimators side by side."""
+
+import numpy as np
+import pytest
+
+from emafault.errors import InputError
+from emafault.identification import evaluation
+from emafault.identification.identifier import fit_identifier
+
+
+def test_metrics_by_hand(width):
+    truth = np.zeros((4, 6))
+    estimate = truth.copy()
+    estimate[:, 0] = [0.01, -0.01, 0.02, 0.0]
+    estimate[:, 5] = [1.2, -1.2, 1.2, -1.2]
+    result = evaluation.errors(estimate, truth, width)
+    assert result["Na"]["mae"] == pytest.approx(0.01)
+    assert result["Na"]["over_range"] == pytest.approx(0.1)
+    assert result["Na"]["bias"] == pytest.approx(0.005)
+    assert result["N"]["mae"] == pytest.approx(0.01 / 3)
+    assert result["dT"]["over_range"] == pytest.approx(0.01)
+    assert result["dT"]["worst"] == pytest.approx(1.2)
+    assert result["mean"]["over_range"] == pytest.approx((0.1 + 0.01) / 6)
+
+
+def test_an_estimator_at_the_bound_has_ratio_one_and_one_below_is_a_leak(width):
+    rng = np.random.default_rng(0)
+    truth = np.zeros((1000, 6))
+    sigma = np.array([1e-3] * 3 + [2e-3] * 2 + [0.4])
+    noise = rng.normal(size=truth.shape) * sigma
+    at = evaluation.errors(noise, truth, width, sigma)
+    assert at["dT"]["ratio"] == pytest.approx(1.0, abs=0.08)
+    assert evaluation.leaks(at) == []
+    noise[:, 5] *= 0.8  # as if the ambient temperature had been used
+    assert evaluation.leaks(evaluation.errors(noise, truth, width, sigma)) == ["dT"]
+
+
+def test_compare_methods_estimators_and_seeds(make_set, actuator, width):
+    known = {"fine": make_set(120, 1), "coarse": make_set(120, 1, noise=4.0)}
+    new = {"fine": make_set(200, 2), "coarse": make_set(200, 2, noise=4.0)}
+
+    def estimator(name):
+        return lambda data, seed: fit_identifier(
+            name, data.features, data.faults, actuator, covariance=data.covariance, folds=2, seed=seed
+        )
+
+    names = ("closed_form", "network")
+    table = evaluation.compare(known, new, {name: estimator(name) for name in names}, range(2), width)
+    assert [(row["method"], row["estimator"], row["seed"]) for row in table] == [
+        (method, name, seed) for method in known for name in names for seed in range(2)
+    ]
+    assert all(row["few"]["rows"] == 10 and row["all"]["rows"] == 200 for row in table)
+    by = {(row["method"], row["estimator"]): row["all"]["errors"] for row in table}
+    assert by["coarse", "closed_form"]["dT"]["mae"] > 3 * by["fine", "closed_form"]["dT"]["mae"]
+    summary = evaluation.over_seeds(row["all"] for row in table if row["estimator"] == "network")
+    assert summary["errors.dT.mae"]["low"] <= summary["errors.dT.mae"]["mean"] <= summary["errors.dT.mae"]["high"]
+
+
+def test_runs_without_features_are_left_out_and_counted(make_set, actuator, width):
+    known, new = make_set(60, 1), make_set(50, 2)
+    known.features[4], new.features[[3, 7]] = np.nan, np.nan
+    fit = fit_identifier("closed_form", known.features, known.faults, actuator)
+    result = evaluation.evaluate(fit.identifier, new, width)
+    assert (result["rows"], result["unidentified"]) == (48, 2)
+    new.features[:] = np.nan
+    with pytest.raises(InputError, match="no run has features"):
+        evaluation.evaluate(fit.identifier, new, width)

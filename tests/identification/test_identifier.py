@@ -1,0 +1,166 @@
+"""The identifier: intervals with measured coverage, wider where magnets lag, files, a unit's calibration, ONNX."""
+
+import json
+
+import numpy as np
+import pytest
+
+from emafault.errors import InputError
+from emafault.faults import FAULT_NAMES
+from emafault.identification import evaluation
+from emafault.identification.export import export_onnx
+from emafault.identification.identifier import Identifier, fit_identifier, nominal_features
+from emafault.identification.intervals import ConformalIntervals, coverage
+
+SETTINGS = {"network": {"coordinates": "log", "width": 8}, "training": {"reweight": 1, "epochs": 60}}
+
+
+@pytest.fixture(scope="module")
+def fitted(training, actuator):
+    t = training
+    return {
+        name: fit_identifier(name, t.features, t.faults, actuator, covariance=t.covariance, seed=0, **SETTINGS)
+        for name in ("network", "closed_form")
+    }
+
+
+@pytest.mark.parametrize("estimator", ["network", "closed_form"])
+def test_coverage_is_the_level(fitted, fresh, estimator):
+    identifier = fitted[estimator].identifier
+    for level in (0.5, 0.9):
+        low, high = identifier.interval(fresh.features, level, fresh.covariance)
+        share = coverage(low, high, fresh.faults)
+        assert abs(share["mean"] - level) < 0.03
+        assert all(abs(share[name] - level) < 0.06 for name in FAULT_NAMES)
+
+
+def test_split_and_plain_intervals_cover_too(training, fresh, actuator):
+    fit = fit_identifier("network", training.features, training.faults, actuator, intervals="split", **SETTINGS)
+    share = coverage(*fit.identifier.interval(fresh.features, 0.9), fresh.faults)
+    assert abs(share["mean"] - 0.9) < 0.06  # 90 calibration rows
+
+
+def test_a_noisier_record_gets_wider_intervals_that_still_cover(fitted, make_set):
+    noisy = make_set(1000, 7, noise=3.0)
+    for fit in fitted.values():
+        low, high = fit.identifier.interval(noisy.features, 0.9, noisy.covariance)
+        assert abs(coverage(low, high, noisy.faults)["mean"] - 0.9) < 0.05
+        blind = coverage(*fit.identifier.interval(noisy.features, 0.9), noisy.faults)
+        assert blind["mean"] < 0.6  # without the covariance they cannot know
+
+
+@pytest.mark.parametrize("estimator", ["network", "closed_form"])
+def test_lagging_magnets_widen_the_intervals(make_set, actuator, estimator):
+    widths = {}
+    for lag in (0.0, 40.0):
+        known, new = make_set(600, 11, alpha_m=-4e-4, lag=lag), make_set(1000, 12, alpha_m=-4e-4, lag=lag)
+        fit = fit_identifier(
+            estimator, known.features, known.faults, actuator, alpha_m=-4e-4, covariance=known.covariance, **SETTINGS
+        )
+        low, high = fit.identifier.interval(new.features, 0.9, new.covariance)
+        assert abs(coverage(low, high, new.faults)["mean"] - 0.9) < 0.04
+        widths[lag] = (high - low).mean(axis=0)
+    assert widths[40.0][5] > 1.5 * widths[0.0][5]
+    assert np.all(widths[40.0][:3] > 1.5 * widths[0.0][:3])
+
+
+def test_conformal_rank_and_refusals():
+    residuals = np.arange(1.0, 20.0)[:, None] * np.ones(6)  # 19 rows: 90 % takes the 18th
+    intervals = ConformalIntervals.calibrate(residuals, None, "by hand")
+    np.testing.assert_allclose(intervals.half_width(0.9, None, 2), 18.0)
+    np.testing.assert_allclose(intervals.half_width(0.5, None, 2), 10.0)
+    with pytest.raises(InputError, match="level"):
+        intervals.half_width(0.99, None, 1)
+    with pytest.raises(InputError, match="calibration rows"):
+        ConformalIntervals.calibrate(residuals[:5], None, "")
+
+
+@pytest.mark.parametrize("estimator", ["network", "closed_form"])
+def test_saved_and_loaded_gives_the_same_numbers(fitted, fresh, tmp_path, estimator):
+    identifier = fitted[estimator].identifier
+    identifier.save(tmp_path / "model")
+    loaded = Identifier.load(tmp_path / "model")
+    assert loaded.estimator == estimator
+    f, c = fresh.features[:20], fresh.covariance[:20]
+    assert np.array_equal(loaded.predict(f), identifier.predict(f))
+    for a, b in zip(loaded.interval(f, 0.9, c), identifier.interval(f, 0.9, c)):
+        assert np.array_equal(a, b)
+    entry = loaded.estimate(f, 0.9, c)[3]
+    assert list(entry) == list(FAULT_NAMES)
+    assert all(e["low"] < e["value"] < e["high"] for e in entry.values())
+    json.dumps(entry)
+    assert [p.name for p in (tmp_path / "model").iterdir()] == ["identifier.json"]
+
+
+def test_broken_or_missing_files_are_refused_in_one_line(fitted, tmp_path):
+    with pytest.raises(InputError, match=r"identifier\.json: no such file"):
+        Identifier.load(tmp_path)
+    fitted["closed_form"].identifier.save(tmp_path)
+    text = (tmp_path / "identifier.json").read_text()
+    (tmp_path / "identifier.json").write_text(text[: len(text) // 2])
+    with pytest.raises(InputError, match="not a saved identifier"):
+        Identifier.load(tmp_path)
+
+
+def test_wrong_number_of_features_is_refused(fitted):
+    with pytest.raises(InputError, match="accepts 6"):
+        fitted["network"].identifier.predict(np.ones((2, 8)))
+
+
+def test_features_far_from_those_learnt_are_told(fitted, fresh):
+    identifier = fitted["network"].identifier
+    assert np.median(identifier.outside(fresh.features)) == 0.0
+    assert identifier.outside(1.3 * fresh.features).min() > 0.05
+
+
+def test_calibration_undoes_a_units_tolerance(fitted, fresh, actuator, width):
+    scale = np.repeat([1.01, 0.995], 3)
+    unit = nominal_features(actuator) * scale
+    off = evaluation.FeatureSet(
+        fresh.features * scale, fresh.faults, fresh.covariance * np.outer(scale, scale), fresh.bound
+    )
+    for fit in fitted.values():
+        both = evaluation.unit_tolerance(fit.identifier, off, unit, width)
+        straight = evaluation.evaluate(fit.identifier, fresh, width)
+        assert both["calibrated"]["errors"]["dT"]["mae"] == pytest.approx(straight["errors"]["dT"]["mae"], rel=1e-6)
+        assert both["calibrated"]["coverage"]["mean"] == pytest.approx(straight["coverage"]["mean"], abs=1e-9)
+        assert both["uncalibrated"]["errors"]["dT"]["mae"] > 2.5
+
+
+def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):
+    from emafault.faults import sample_faults
+    from emafault.identification import closed_form
+
+    from .conftest import RANGES
+
+    sets = []
+    for runs, seed in ((400, 1), (500, 2)):
+        faults = sample_faults(runs, seed=seed, **RANGES)
+        rng = np.random.default_rng(seed)
+        R, k = closed_form.forward(faults, actuator, eccentricity_law="rotor_angle")
+        relative = np.repeat([2e-3, 5e-4], 3)
+        six = np.hstack([R, k]) * (1 + relative * rng.normal(size=(runs, 6)))
+        covariance = np.diag(relative**2) * six[:, :, None] * six[:, None, :]
+        xi = faults[:, 3:5] + 1e-3 * rng.normal(size=(runs, 2))
+        sets.append(evaluation.FeatureSet(np.hstack([six, xi]), faults, covariance))
+    for name in ("closed_form", "network"):
+        fit = fit_identifier(
+            name, sets[0].features, sets[0].faults, actuator, covariance=sets[0].covariance, **SETTINGS
+        )
+        result = evaluation.evaluate(fit.identifier, sets[1], width)
+        assert result["errors"]["xi"]["mae"] < 1.1e-3
+        assert result["errors"]["N"]["mae"] < 1e-3
+        assert abs(result["coverage"]["mean"] - 0.9) < 0.05
+
+
+def test_onnx_takes_si_and_equals_torch_and_the_network(fitted, fresh, tmp_path):
+    path = tmp_path / "network.onnx"
+    network = fitted["network"].identifier.network
+    difference = export_onnx(network, path, fresh.features[:50])
+    assert difference["against_torch"] < 1e-5
+    assert difference["against_float64"] < 1e-4
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    (got,) = session.run(None, {"features": fresh.features[:3].astype(np.float32)})  # another number of rows
+    np.testing.assert_allclose(got[:, 5], network.predict(fresh.features[:3])[:, 5], atol=0.01)
