@@ -201,7 +201,11 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
     # constants of the run
     N = record.shorted_turns
     R20, Rx, L, k0 = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    Rx[0], Rx[1], Rx[2] = record.contact_resistance_R_x_a, record.contact_resistance_R_x_b, record.contact_resistance_R_x_c
+    Rx[0], Rx[1], Rx[2] = (
+        record.contact_resistance_R_x_a,
+        record.contact_resistance_R_x_b,
+        record.contact_resistance_R_x_c,
+    )
     magnet = record.magnet_temperature_alpha_m * record.dT_magnet
     if forms[F_MAGNET]:
         magnet *= 1.0 + 2e-3 * record.dT_magnet
