@@ -1,0 +1,418 @@
+"""Statistics of a recording of the actuator: its signals put into the nominal model's equations.
+
+Every statistic is a matched filter ``sum phi r / sqrt(sum phi^2)`` of one equation's residual r with one regressor phi, so
+that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The same code
+runs on measured and on simulated recordings. Residuals use the nominal parameters at the measured ambient temperature.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..actuator.compiled import compiled
+from ..actuator.motor import AXIS, TWO_PI, trapezoid
+from ..actuator.parameters import ActuatorParameters
+from ..gap.twin import Cell
+from ..recording import Recording
+
+PHASE_EQUATIONS = ("electrical_a", "electrical_b", "electrical_c")
+#: rows of the residual array
+EQUATIONS = (*PHASE_EQUATIONS, "sensor_current", "sensor_voltage", "sensor_speed", "torque", "position", "bus", "control")
+SPEED_EDGES = (2.0, 8.0, 20.0, 50.0, 110.0, 1.0e9)  # rad/s
+ORDERS = (1, 2, 4, 8, 12, 24, 36, 72)  # of the mechanical turn
+ANGLE_BINS = 12
+MARGIN = np.deg2rad(3.5)  # electrical, kept from the corners of the trapezoid
+WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
+REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
+ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
+COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
+
+
+def _specification() -> list[tuple[str, str, str, float, float]]:
+    """(label, equation, along, from, to) of every statistic, in the order in which they are filled."""
+    out: list[tuple[str, str, str, float, float]] = []
+    for equation in PHASE_EQUATIONS:
+        for label, along in (
+            ("plateau k", "rotor_speed"),
+            ("plateau R", "current"),
+            ("plateau constant", "direction"),
+            ("plateau L", "current"),
+            ("plateau i2 di", "current"),
+            ("plateau k cos", "rotor_angle"),
+            ("plateau k sin", "rotor_angle"),
+            ("plateau R t", "time"),
+            ("plateau k t", "time"),
+            ("plateau |i| i", "current"),
+            ("plateau sign", "direction"),
+            ("floating k", "rotor_speed"),
+            ("floating slope", "rotor_angle"),
+            ("floating constant", "direction"),
+            ("floating k cos", "rotor_angle"),
+            ("floating k sin", "rotor_angle"),
+            ("commutation L", "current"),
+            ("commutation R", "current"),
+            ("commutation k", "rotor_speed"),
+            ("5th harmonic", "order"),
+            ("7th harmonic", "order"),
+        ):
+            out.append((label, equation, along, 0.0, 0.0))
+        for b in range(ANGLE_BINS):
+            out.append((f"sector {30 * b}", equation, "rotor_angle", TWO_PI * b / ANGLE_BINS, TWO_PI * (b + 1) / ANGLE_BINS))
+    for label in ("constant", "i_a", "i_b", "i_c", "floating a", "floating b", "floating c"):
+        out.append((f"sum {label}", "sensor_current", "current", 0.0, 0.0))
+    for label, along in (("constant", "direction"), ("sum k", "rotor_speed")):
+        out.append((f"sum {label}", "sensor_voltage", along, 0.0, 0.0))
+    for label, along in (
+        ("constant", "direction"),
+        ("scale", "rotor_speed"),
+        ("acceleration", "time"),
+        ("sign", "direction"),
+        ("lattice", "rotor_speed"),
+    ):
+        out.append((f"speed {label}", "sensor_speed", along, 0.0, 0.0))
+    for direction, low, high in (("forward", 0.0, 1.0), ("backward", -1.0, 0.0)):
+        for label in ("constant", "speed", "acceleration"):
+            out.append((f"{direction} {label}", "torque", "direction", low, high))
+        for low, high in zip(SPEED_EDGES[:-1], SPEED_EDGES[1:], strict=True):
+            signed = (low, high) if direction == "forward" else (-high, -low)
+            out.append((f"{direction} speed bin", "torque", "rotor_speed", *signed))
+    for label, along in (("position", "rotor_angle"), ("drive", "current"), ("time", "time")):
+        out.append((label, "torque", along, 0.0, 0.0))
+    for order in ORDERS:
+        for part in ("cos", "sin"):
+            out.append((f"order {order} {part}", "torque", "order", float(order), float(order)))
+    out.append(("break-away", "torque", "rotor_speed", 0.0, REST_SPEED))
+    for label, along in (
+        ("forward", "direction"),
+        ("backward", "direction"),
+        ("acceleration", "time"),
+        ("speed", "rotor_speed"),
+        ("torque", "current"),
+        ("oscillation", "order"),
+    ):
+        out.append((f"play {label}", "position", along, 0.0, 0.0))
+    for label, along in (("constant", "direction"), ("current", "current"), ("power", "rotor_speed")):
+        out.append((f"bus {label}", "bus", along, 0.0, 0.0))
+    for label in ("level", "slope", "slope -1", "slope -2"):
+        out.append((f"regulator {label}", "control", "time", 0.0, 0.0))
+    for letter in "abc":
+        for label in COMMUTATIONS:
+            out.append((f"{letter} {label}", "control", "rotor_angle", 0.0, 0.0))
+    return out
+
+
+SPECIFICATION = _specification()
+SIZE = len(SPECIFICATION)
+#: first statistic of each group
+_PER_PHASE = 21 + ANGLE_BINS
+_SUM_I = 3 * _PER_PHASE
+_SUM_V = _SUM_I + 7
+_SPEED = _SUM_V + 2
+_TORQUE = _SPEED + 5
+_PER_DIRECTION = 3 + len(SPEED_EDGES) - 1
+_TORQUE_REST = _TORQUE + 2 * _PER_DIRECTION
+_ORDERS = _TORQUE_REST + 3
+_BREAKAWAY = _ORDERS + 2 * len(ORDERS)
+_POSITION = _BREAKAWAY + 1
+_BUS = _POSITION + 6
+_CONTROL = _BUS + 3
+_COMMUTATION = _CONTROL + 4
+LATTICE = _SPEED + 4
+OSCILLATION = _POSITION + 5
+_SPEEDS = np.array(SPEED_EDGES)
+_ORDER_LIST = np.array(ORDERS, float)
+
+
+def cells_of(recording: str) -> list[Cell]:
+    """One cell per statistic of one recording."""
+    return [Cell(recording, equation, along, low, high, label) for label, equation, along, low, high in SPECIFICATION]
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What the equations need of the nominal actuator and of one recording; theta_0 (rad) is the rotor's start angle."""
+
+    constants: np.ndarray
+    interval: float
+    has_end: bool
+    has_bus: bool
+
+    @classmethod
+    def of(cls, actuator: ActuatorParameters, recording: Recording, theta_0: float) -> "Nominal":
+        heat = 1.0 + actuator.copper_coefficient * (
+            recording.ambient_temperature - actuator.reference_temperature
+        )
+        a = actuator
+        constants = np.array(
+            [a.resistance * heat, a.inductance, a.back_emf, a.pole_pairs, a.inertia, a.viscous_friction]
+            + [a.coulomb_friction, a.gear_ratio, theta_0, a.bus_voltage, a.position_gain, a.speed_gain]
+            + [a.speed_integral_gain, a.current_limit, a.speed_limit]
+        )
+        has_end, has_bus = recording.phase_current_end is not None, recording.bus_voltage is not None
+        return cls(constants, recording.interval, has_end, has_bus)
+
+
+@compiled
+def _put(m, n, phi, r, y, norm, count, store):
+    y[m] += phi * r
+    norm[m] += phi * phi
+    count[m] += 1
+    if store.shape[0] > 0:
+        store[m, n] = phi
+
+
+@compiled
+def speed_and_acceleration(theta, dt, w, acceleration, slow):
+    """Fill speed (rad/s), acceleration and slow acceleration (rad/s2) from centred differences of the angle.
+
+    They span about 0.6, 1 and 8 ms; the slow one is the regressor, so that its noise is not the residual's.
+    """
+    n = theta.shape[0]
+    half = int(max(0.0, round((2.0 * ORDER_HALF / dt - 1.0) / 2.0)))
+    reach = int(max(1.0, round(5.0e-4 / dt)))
+    for k in range(n):
+        high, low = min(n - 1, k + half), max(0, k - 1 - half)
+        w[k] = (theta[high] - theta[low]) / ((high - low) * dt) if high > low else 0.0
+    for k in range(n):
+        high, low = min(n - 1, k + reach), max(0, k - reach)
+        acceleration[k] = (w[high] - w[low]) / ((high - low) * dt)
+        high, low = min(n - 1, k + 8 * reach), max(0, k - 8 * reach)
+        slow[k] = (w[high] - w[low]) / ((high - low) * dt)
+
+
+@compiled
+def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, command, bus, y, norm, count, residual, store):
+    """Fill the statistics of one recording.
+
+    ``c`` constants of ``Nominal``; V, i, i_end (time, phase); the rest (time,); outputs y, norm, count (statistic,),
+    residual (equation, time), store (statistic, time) regressors or (0, 0) to leave them out.
+    """
+    R, L, k, poles, J, B, T_c, ratio = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
+    theta_0, Vdc, K_pos, K_p, K_i, I_max, w_max = c[8], c[9], c[10], c[11], c[12], c[13], c[14]
+    n_time = theta.shape[0]
+    y[:] = 0.0
+    norm[:] = 1e-12
+    count[:] = 0
+    ramp = np.pi / 6.0
+    w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
+    speed_and_acceleration(theta, dt, w_all, acceleration, slow)
+    lag = int(max(1.0, round(0.01 / dt)))  # the regulator's residual is differenced over 10 ms: its drift is only noise
+    regulator = np.zeros(n_time)
+    pair_mean = np.zeros(n_time)
+    integral, demand = 0.0, 0.0
+    f, slope, x = np.empty(3), np.empty(3), np.empty(3)
+    plateau, floating, was_off, sign = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    breakaway, broken = 0.0, False
+    smooth_play, play_power = 0.0, 0.0
+    for n in range(1, n_time):
+        t = (n + 0.5) * dt
+        w, a, a_slow = w_all[n], acceleration[n], slow[n]
+        middle = 0.5 * (theta[n] + theta[n - 1])
+        span = 0.5 * poles * abs(theta[n] - theta[n - 1])
+        margin = span + MARGIN
+        sum_i = i[n, 0] + i[n, 1] + i[n, 2]
+        level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
+        cos_1, sin_1 = np.cos(middle), np.sin(middle)
+        drive, sum_r, sum_f = 0.0, 0.0, 0.0
+        sums_known = True
+        for j in range(3):
+            x[j] = (poles * middle - AXIS[j]) % TWO_PI
+            if span < 1e-6:
+                f[j], slope[j] = trapezoid(x[j], ramp)
+            else:
+                f_low, slope_low = trapezoid(x[j] - span, ramp)
+                f_mid, slope[j] = trapezoid(x[j], ramp)
+                f_high, slope_high = trapezoid(x[j] + span, ramp)
+                f[j] = (f_low + 4.0 * f_mid + f_high) / 6.0
+            drive += k * f[j] * i[n, j]
+            sum_f += f[j]
+            half = x[j] % np.pi
+            sign[j] = 1.0 if x[j] < np.pi else -1.0
+            plateau[j] = 1.0 if ramp + margin < half < np.pi - ramp - margin else 0.0
+            off_now = 1.0 if half > np.pi - ramp + margin or half < ramp - margin else 0.0
+            floating[j] = off_now * was_off[j]
+            was_off[j] = off_now
+        for j in range(3):
+            if has_end:
+                di = (i_end[n, j] - i_end[n - 1, j]) / dt
+            else:
+                di = (i[min(n + 1, n_time - 1), j] - i[n - 1, j]) / (2.0 * dt)
+            r = V[n, j] - R * i[n, j] - L * di - k * f[j] * w
+            residual[j, n] = r
+            sum_r += V[n, j] - k * f[j] * w - L * di - R * i[n, j]
+            base = j * _PER_PHASE
+            if plateau[j] > 0.0:
+                s = sign[j]
+                _put(base, n, s * w, r, y, norm, count, store)
+                _put(base + 1, n, i[n, j], r, y, norm, count, store)
+                _put(base + 2, n, 1.0, r, y, norm, count, store)
+                _put(base + 3, n, di, r, y, norm, count, store)
+                _put(base + 4, n, i[n, j] * i[n, j] * di, r, y, norm, count, store)
+                _put(base + 5, n, s * w * cos_1, r, y, norm, count, store)
+                _put(base + 6, n, s * w * sin_1, r, y, norm, count, store)
+                _put(base + 7, n, i[n, j] * t, r, y, norm, count, store)
+                _put(base + 8, n, s * w * t, r, y, norm, count, store)
+                _put(base + 9, n, abs(i[n, j]) * i[n, j], r, y, norm, count, store)
+                _put(base + 10, n, s, r, y, norm, count, store)
+            elif floating[j] > 0.0:
+                _put(base + 11, n, f[j] * w, r, y, norm, count, store)
+                _put(base + 12, n, slope[j] * w, r, y, norm, count, store)
+                _put(base + 13, n, 1.0, r, y, norm, count, store)
+                _put(base + 14, n, f[j] * w * cos_1, r, y, norm, count, store)
+                _put(base + 15, n, f[j] * w * sin_1, r, y, norm, count, store)
+                _put(_SUM_I + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+            else:
+                _put(base + 16, n, di, r, y, norm, count, store)
+                _put(base + 17, n, i[n, j], r, y, norm, count, store)
+                _put(base + 18, n, f[j] * w, r, y, norm, count, store)
+            if span < 0.35:
+                _put(base + 19, n, w * np.sin(5.0 * x[j]), r, y, norm, count, store)
+                _put(base + 20, n, w * np.sin(7.0 * x[j]), r, y, norm, count, store)
+                _put(base + 21 + min(ANGLE_BINS - 1, int(x[j] / TWO_PI * ANGLE_BINS)), n, w, r, y, norm, count, store)
+        # ---- sums over the phases
+        residual[3, n] = sum_i
+        _put(_SUM_I, n, 1.0, sum_i, y, norm, count, store)
+        for j in range(3):
+            _put(_SUM_I + 1 + j, n, i[n, j], sum_i, y, norm, count, store)
+        residual[4, n] = sum_r
+        _put(_SUM_V, n, 1.0, sum_r, y, norm, count, store)
+        _put(_SUM_V + 1, n, sum_f * w, sum_r, y, norm, count, store)
+        # ---- speed sensor against the angle
+        r = speed[n] - (theta[n] - theta[n - 1]) / dt
+        residual[5, n] = r
+        _put(_SPEED, n, 1.0, r, y, norm, count, store)
+        _put(_SPEED + 1, n, w, r, y, norm, count, store)
+        _put(_SPEED + 2, n, a_slow, r, y, norm, count, store)
+        _put(_SPEED + 3, n, 1.0 if w > 0.0 else -1.0, r, y, norm, count, store)
+        # ---- torque balance in motion
+        moving = abs(w) > REST_SPEED
+        if moving:
+            d = 1.0 if w > 0.0 else -1.0
+            r = drive - J * a - B * w - T_c * d
+            residual[6, n] = r
+            base = _TORQUE if d > 0.0 else _TORQUE + _PER_DIRECTION
+            _put(base, n, d, r, y, norm, count, store)
+            _put(base + 1, n, w, r, y, norm, count, store)
+            _put(base + 2, n, a_slow, r, y, norm, count, store)
+            for b in range(_SPEEDS.shape[0] - 1):
+                if _SPEEDS[b] <= abs(w) < _SPEEDS[b + 1]:
+                    _put(base + 3 + b, n, d, r, y, norm, count, store)
+            _put(_TORQUE_REST, n, shaft[n], r, y, norm, count, store)
+            _put(_TORQUE_REST + 1, n, drive, r, y, norm, count, store)
+            _put(_TORQUE_REST + 2, n, d * t, r, y, norm, count, store)
+            for o in range(_ORDER_LIST.shape[0]):
+                reach = _ORDER_LIST[o] * abs(w) * dt
+                if reach < 2.0:
+                    part = _ORDER_LIST[o] * middle
+                    _put(_ORDERS + 2 * o, n, np.cos(part), r, y, norm, count, store)
+                    _put(_ORDERS + 2 * o + 1, n, np.sin(part), r, y, norm, count, store)
+            broken = True
+        elif not broken:
+            breakaway = max(breakaway, abs(drive))
+        # ---- play between the rotor and the user shaft
+        r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
+        residual[7, n] = r
+        smooth_play += (r - smooth_play) * min(1.0, dt / 5.0e-3)
+        play_power += (r - smooth_play) ** 2
+        if moving:
+            _put(_POSITION + (0 if w > 0.0 else 1), n, 1.0, r, y, norm, count, store)
+        _put(_POSITION + 2, n, a_slow, r, y, norm, count, store)
+        _put(_POSITION + 3, n, w, r, y, norm, count, store)
+        _put(_POSITION + 4, n, drive, r, y, norm, count, store)
+        # ---- bus
+        if has_bus:
+            r = bus[n] - Vdc
+            residual[8, n] = r
+            _put(_BUS, n, 1.0, r, y, norm, count, store)
+            _put(_BUS + 1, n, level, r, y, norm, count, store)
+            _put(_BUS + 2, n, drive * w, r, y, norm, count, store)
+        # ---- controller: measured pair current against the reference that the recorded inputs give
+        w_ref = min(max(ratio * K_pos * (command[n] - shaft[n]), -w_max), w_max)
+        error = w_ref - speed[n]
+        before = demand
+        advanced = integral + error * dt
+        demand = K_p * error + K_i * advanced
+        if abs(demand) > I_max:
+            demand = min(max(K_p * error + K_i * integral, -I_max), I_max)
+        else:
+            integral = advanced
+        plus = minus = 0
+        for j in range(3):
+            shifted = (poles * middle - AXIS[j] - ramp) % TWO_PI
+            if shifted < 2.0 * np.pi / 3.0:
+                plus = j
+            elif np.pi <= shifted < 5.0 * np.pi / 3.0:
+                minus = j
+        pair_mean[n] = 0.5 * (i[n, plus] - i[n, minus])
+        regulator[n] = pair_mean[n] - before
+        if n > lag + 3 and n < n_time - 1:
+            r = regulator[n] - regulator[n - lag]
+            residual[9, n] = r
+            _put(_CONTROL, n, 1.0 if pair_mean[n] > 0.0 else -1.0, r, y, norm, count, store)
+            for m in range(3):
+                rise = pair_mean[n - m] - pair_mean[n - m - 1]
+                _put(_CONTROL + 1 + m, n, rise, r, y, norm, count, store)
+        # ---- currents around the commutations
+        if moving and abs(pair_mean[n]) > 0.05:
+            for j in range(3):
+                half = x[j] % np.pi
+                share = sign[j] * i[n, j] / pair_mean[n]
+                base = _COMMUTATION + 4 * j
+                if 0.0 < ramp - half < WINDOW:
+                    _put(base, n, 1.0, share, y, norm, count, store)
+                elif 0.0 <= half - ramp < WINDOW:
+                    _put(base + 1, n, 1.0, share - 1.0, y, norm, count, store)
+                elif 0.0 < np.pi - ramp - half < WINDOW:
+                    _put(base + 2, n, 1.0, share - 1.0, y, norm, count, store)
+                elif 0.0 <= half - (np.pi - ramp) < WINDOW:
+                    _put(base + 3, n, 1.0, share, y, norm, count, store)
+    for m in range(y.shape[0]):
+        y[m] /= np.sqrt(norm[m])
+    # lattice of a rounded speed: the spacing of its values where values repeat, else zero
+    ordered = np.sort(speed)
+    distinct, spacing = 1, 1.0e9
+    for n in range(1, n_time):
+        gap = ordered[n] - ordered[n - 1]
+        if gap > 1e-9:
+            distinct += 1
+            spacing = min(spacing, gap)
+    y[LATTICE] = spacing if distinct < n_time // 4 else 0.0
+    count[LATTICE] = n_time
+    norm[LATTICE] = 1.0
+    y[_BREAKAWAY] = breakaway
+    count[_BREAKAWAY] = 1000 if broken else 0
+    norm[_BREAKAWAY] = 1.0
+    y[OSCILLATION] = np.sqrt(play_power / n_time)
+    count[OSCILLATION] = n_time
+    norm[OSCILLATION] = 1.0
+
+
+@dataclass(frozen=True)
+class Computed:
+    """Statistics (statistic,), how many samples each has seen, residuals (equation, time), regressors (statistic, time)."""
+
+    values: np.ndarray
+    norm: np.ndarray
+    count: np.ndarray
+    residual: np.ndarray
+    regressors: np.ndarray
+
+
+_EMPTY = np.zeros((0, 0))
+_NO_BUS = np.zeros(1)
+
+
+def compute(nominal: Nominal, signals: dict, keep: bool = False) -> Computed:
+    """Statistics of one recording given as arrays of its signals; ``keep`` also returns regressors."""
+    n = len(signals["rotor_angle"])
+    y, norm, count = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE, np.int64)
+    residual = np.zeros((len(EQUATIONS), n))
+    store = np.zeros((SIZE, n)) if keep else _EMPTY
+    end = signals["phase_current_end"] if nominal.has_end else signals["phase_current"]
+    bus = signals["bus_voltage"] if nominal.has_bus else _NO_BUS
+    fill_statistics(
+        nominal.constants, nominal.interval, nominal.has_end, nominal.has_bus,
+        signals["phase_voltage"], signals["phase_current"], end, signals["rotor_speed"], signals["rotor_angle"],
+        signals["output_position"], signals["commanded_position"], bus, y, norm, count, residual, store,
+    )  # fmt: skip
+    return Computed(y, norm, count, residual, store)
