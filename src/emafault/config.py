@@ -300,6 +300,64 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
     return recursively_sorted(spec)
 
 
+def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any]:
+    """What reconstructing with one entry of the group reconstruction reads."""
+    return recursively_sorted({"settings": config["reconstruction"][method], "actuator": config["actuator"]})
+
+
+def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What the Cramer-Rao bound of the fresh rows reads."""
+    spec = {
+        "dataset": dataset_spec(config, "fresh"),
+        "runs": min(config["evaluation"]["bound_runs"], config["sampling"]["fresh"]),
+        "discard": config["recording"]["discard"],
+        "magnet_coefficient": magnet_coefficient(config),
+    }
+    return recursively_sorted(spec)
+
+
+def magnet_coefficient(config: Mapping[str, Any]) -> float:
+    """The magnets' temperature coefficient (1/K) that estimators are told."""
+    return all_effects(config).get("magnet_temperature", {}).get("alpha_m", 0.0)
+
+
+def identification_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What every estimator reads; networks add ``network_spec``, the search ``search_spec``."""
+    spec = {
+        "actuator": config["actuator"],
+        "magnet_coefficient": magnet_coefficient(config),
+        "faults": _pick(config["faults"], "N", "xi", "dT"),
+    }
+    return recursively_sorted(spec)
+
+
+def network_spec(config: Mapping[str, Any], estimator: str) -> dict[str, Any]:
+    """What fitting an estimator reads; that of the search reads its network and training from what the search found."""
+    spec = identification_spec(config)
+    if estimator != "closed_form":
+        spec["seeds"] = config["evaluation"]["seeds"]
+    if estimator == "network":
+        spec |= _pick(config, "network", "training")
+    return recursively_sorted(spec)
+
+
+def search_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What the search reads; the storage is where it is kept and changes no result."""
+    search = {key: value for key, value in config["search"].items() if key not in ("workers", "storage")}
+    return recursively_sorted(identification_spec(config) | _pick(config, "network", "training") | {"search": search})
+
+
+def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What the evaluation reads."""
+    methods = config["reconstruction"].items()
+    spec = {
+        "level": config["evaluation"]["level"],
+        "draws": max(10, config["evaluation"]["seeds"]),
+        "plateau_only": {name: entry["method"] == "weighted" and not entry["floating"] for name, entry in methods},
+    }
+    return recursively_sorted(identification_spec(config) | spec)
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.

@@ -153,13 +153,18 @@ class Search:
     trials: int = number(0, 1_000_000)
     workers: int = number(1, 64)
     reconstruction: str = choice()
+    sampler: str = choice("tpe", "nsga2")
+    repeats: int = number(1, 100)
+    tolerance: float = number(0.0, 10.0)
     seed: int = number(0, 2**31)
     storage: str | None = choice()
+    space: dict[str, dict[str, Any]] = group()
 
 
 @dataclass
 class Evaluation:
     seeds: int = number(1, 100)
+    bound_runs: int = number(1, 1_000_000)
     level: float = number(0.5, 0.999)
 
 
@@ -202,6 +207,16 @@ RECONSTRUCTIONS: dict[str, type] = {
         ],
     ),
     "weighted": make_dataclass("weighted", [("method", str, choice("weighted")), *_WEIGHTED]),
+    "angle_resolved": make_dataclass(
+        "angle_resolved",
+        [
+            ("method", str, choice("angle_resolved")),
+            *_WEIGHTED,
+            ("eccentricity_law", str, choice("rotor_angle", "rotor_angle_per_phase")),
+            ("order", int, number(1, 20)),
+            ("subdivisions", int, number(0, 360)),
+        ],
+    ),
 }
 COMMANDS: dict[str, type] = {
     name: make_dataclass(

@@ -1,0 +1,141 @@
+"""Evaluation of every trained estimator on fresh rows: metrics in physical units beside the bound; the estimates."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from ..faults import FAULT_NAMES
+from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
+from ..identification.identifier import Identifier
+from ..recording import replace_atomically
+from .features import FeatureTable, read_features
+from .networks import HISTORY, folders, read_json, seed_folder, width_of, write_json
+
+FEW = 10  # rows of the paper's external validation
+_GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
+
+
+def read_bound(path: str | Path) -> dict[str, np.ndarray | None]:
+    """``plateau`` and ``floating`` -> (6,) Cramer-Rao standard deviation averaged over runs, None where none holds."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            means = {name: np.mean(data[name].values, axis=0) for name in ("plateau", "floating")}
+    except (OSError, KeyError) as error:
+        raise InputError(f"{path}: not a readable bound ({error})") from error
+    return {name: mean if np.all(np.isfinite(mean)) else None for name, mean in means.items()}
+
+
+def healthy_units(reference: FeatureTable, units: int, spec: Mapping[str, Any]) -> np.ndarray:
+    """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC, from healthy recordings soaked at a measured one."""
+    actuator = ActuatorParameters(**spec["actuator"])
+    dT = (reference.ambient_temperature - actuator.reference_temperature)[:, None]
+    copper, magnets = 1.0 + actuator.copper_coefficient * dT, 1.0 + spec["magnet_coefficient"] * dT
+    cold = np.concatenate([reference.features.R / copper, reference.features.k / magnets], axis=1)
+    return np.mean(cold.reshape(units, -1, 6), axis=1)
+
+
+def _identifiers(folder: Path) -> list[Identifier]:
+    return [Identifier.load(seed_folder(folder, seed)) for seed in range(read_json(folder / HISTORY)["seeds"])]
+
+
+def evaluate_identification(
+    histories: Sequence[str],
+    fresh: Sequence[str],
+    references: Sequence[str],
+    bound_file: str,
+    spec: Mapping[str, Any],
+    metrics: str,
+    estimates: str,
+) -> None:
+    """Evaluate all estimators of all methods.
+
+    Parameters
+    ----------
+    histories : ``.../identifiers/<method>/<estimator>/history.json`` of every estimator
+    fresh, references : feature tables ``<part>_<method>.nc``; references are empty unless units are calibrated
+    bound_file : what ``features.compute_bound`` wrote
+    spec : the sub-tree ``config.evaluation_spec``
+    metrics, estimates : files to write; estimates are those of each estimator's first seed
+    """
+    import xarray as xr
+
+    tables = {Path(path).stem.removeprefix("fresh_"): read_features(path) for path in fresh}
+    units = {Path(path).stem.removeprefix("reference_"): read_features(path) for path in references}
+    bounds, width = read_bound(bound_file), width_of(spec["faults"])
+    entries, variables = [], {}
+    for folder in folders(histories):
+        method, estimator = folder.parent.name, folder.name
+        plateau_only = spec["plateau_only"].get(method, False)
+        table = tables[method]
+        rows = np.all(np.isfinite(table.inputs), axis=1)
+        unit = None
+        if method in units:
+            unit = healthy_units(units[method], len(rows), spec)
+            rows &= np.all(np.isfinite(unit), axis=1)
+            unit = unit[rows]
+        known = table.rows(rows)
+        data = FeatureSet(
+            known.inputs, known.faults, known.covariance, bounds["plateau" if plateau_only else "floating"]
+        )
+        models = _identifiers(folder)
+        entry: dict[str, Any] = {
+            "method": method,
+            "estimator": estimator,
+            "seeds": len(models),
+            "parameters": models[0].parameters,
+            "unidentified": int(np.sum(~rows)),
+            "intervals": models[0].intervals.method,
+        }
+        for name, calibration in {"": None, "_calibrated": unit}.items():
+            if name and calibration is None:
+                continue
+            every = [evaluate(model, data, width, spec["level"], calibration) for model in models]
+            entry[f"all{name}"] = over_seeds(every)
+            entry[f"few{name}"] = over_seeds(
+                _few(models[seed % len(models)], data, width, spec["level"], calibration, seed)
+                for seed in range(spec["draws"])
+            )
+            value = models[0].predict(data.features, data.covariance, calibration)
+            low, high = models[0].interval(data.features, spec["level"], data.covariance, calibration)
+            for kind, values in {"value": value, "low": low, "high": high, "truth": data.faults}.items():
+                full = np.full((len(rows), 6), np.nan)
+                full[rows] = values
+                variables[f"{method}.{estimator}{name}.{kind}"] = (("run", "component"), full)
+        entries.append(entry)
+    shown = {name: None if b is None else _bound_means(b) for name, b in bounds.items()}
+    write_json(
+        metrics,
+        {"level": spec["level"], "width": dict(zip(FAULT_NAMES, width.tolist())), "bound": shown, "results": entries},
+    )
+    data_set = xr.Dataset(variables, {"component": list(FAULT_NAMES)}, {"title": "estimates of fresh runs"})
+    replace_atomically(Path(estimates), lambda temporary: data_set.to_netcdf(temporary, engine="netcdf4"))
+
+
+def _few(
+    model, data: FeatureSet, width: np.ndarray, level: float, unit: np.ndarray | None, seed: int
+) -> dict[str, Any]:
+    """The paper's terms: ten rows, other ones for each seed."""
+    pick = np.random.default_rng([seed, 30]).choice(len(data.faults), min(FEW, len(data.faults)), replace=False)
+    return evaluate(model, data.rows(pick), width, level, None if unit is None else unit[pick])
+
+
+def _bound_means(bound: np.ndarray) -> dict[str, float]:
+    """Mean absolute error at the bound by component and for N, xi and dT together."""
+    means = {name: float(_GAUSSIAN * bound[j]) for j, name in enumerate(FAULT_NAMES)}
+    return means | {name: float(_GAUSSIAN * np.mean(bound[list(columns)])) for name, columns in GROUPS.items()}
+
+
+def summary(metrics: str | Path) -> dict[str, Any]:
+    """What ``evaluate_identification`` wrote.
+
+    Raises
+    ------
+    InputError : a file that cannot be read
+    """
+    return read_json(metrics)

@@ -1,0 +1,209 @@
+"""Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file; their Cramer-Rao bound."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..dataset import BLOCK, count_runs, read_blocks, sample_runs
+from ..errors import InputError
+from ..faults import FAULT_NAMES
+from ..progress import progress, say
+from ..reconstruction import Features, join_features, reconstruct
+from ..recording import PHASES, replace_atomically
+
+_UNITS = {"R": "ohm", "k": "V s/rad", "L": "H", "offset": "V"}
+_SIGNALS = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle", "bus_voltage")
+
+
+@dataclass(frozen=True)
+class FeatureTable:
+    """Features of many runs with what is known of each run."""
+
+    features: Features
+    faults: np.ndarray  # (run, 6)
+    ambient_temperature: np.ndarray  # (run,) degC, measured
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """(run, 6) R and k, or (run, 8) with xi behind them where the method measures xi by itself."""
+        xi = self.features.extras.get("xi")
+        return self.features.six if xi is None else np.concatenate([self.features.six, xi], axis=1)
+
+    @property
+    def covariance(self) -> np.ndarray | None:
+        """(run, 6, 6) of R and k, None where the method gives none."""
+        return self.features.covariance if np.all(np.isfinite(self.features.covariance)) else None
+
+    def identified(self) -> "FeatureTable":
+        """The runs whose records held enough to estimate all features."""
+        return self.rows(np.all(np.isfinite(self.inputs), axis=1))
+
+    def rows(self, rows: np.ndarray) -> "FeatureTable":
+        """Some of the runs."""
+        f = self.features
+        extras = {name: values[rows] for name, values in f.extras.items()}
+        kept = Features(f.R[rows], f.k[rows], f.L[rows], f.offset[rows], f.covariance[rows], extras)
+        return FeatureTable(kept, self.faults[rows], self.ambient_temperature[rows])
+
+
+def reconstruct_features(shards: Sequence[str], spec: Mapping[str, Any], output: str | Path) -> None:
+    """Reconstruct every run of a part by one method.
+
+    Parameters
+    ----------
+    spec : the sub-tree ``config.reconstruction_spec``
+
+    Raises
+    ------
+    InputError : shards that cannot be read, or no run that determines the features
+    """
+    settings = dict(spec["settings"])
+    method, actuator = settings.pop("method"), ActuatorParameters(**spec["actuator"])
+    parts, faults, ambient = [], [], []
+    blocks = progress(
+        read_blocks(shards, _SIGNALS), f"reconstruct {Path(output).stem}", -(-count_runs(shards) // BLOCK)
+    )
+    for block in blocks:
+        parts.append(reconstruct(method, block.signals, block.interval, actuator, settings))
+        faults.append(block.faults)
+        ambient.append(block.signals["ambient_temperature"])
+    write_features(output, FeatureTable(join_features(parts), np.concatenate(faults), np.concatenate(ambient)))
+
+
+def write_features(path: str | Path, table: FeatureTable) -> None:
+    """Write a feature table as netCDF.
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    import xarray as xr
+
+    f = table.features
+    variables: dict[str, Any] = {
+        name: (("run", "phase"), getattr(f, name), {"units": unit}) for name, unit in _UNITS.items()
+    }
+    variables["covariance"] = (("run", "feature", "feature_"), f.covariance, {"long_name": "of R and k, SI"})
+    variables["fault"] = (("run", "component"), table.faults)
+    variables["ambient_temperature"] = ("run", table.ambient_temperature, {"units": "degC"})
+    for name, values in f.extras.items():
+        variables[f"extra_{name}"] = (("run", *(f"{name}_{n}" for n in range(1, values.ndim))), values)
+    names = [f"{quantity}_{phase}" for quantity in "Rk" for phase in PHASES]
+    data = xr.Dataset(
+        variables,
+        {"phase": list(PHASES), "component": list(FAULT_NAMES), "feature": names, "feature_": names},
+        {"title": "reconstructed phase parameters", "Conventions": "CF-1.11"},
+    )
+    replace_atomically(Path(path), lambda temporary: data.to_netcdf(temporary, engine="netcdf4"))
+
+
+def read_features(path: str | Path) -> FeatureTable:
+    """Read what ``write_features`` wrote.
+
+    Raises
+    ------
+    InputError : no such file, or not one of these
+    """
+    import xarray as xr
+
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            data.load()
+            extras = {
+                str(n).removeprefix("extra_"): data[n].values for n in data.variables if str(n).startswith("extra_")
+            }
+            R, k, L, offset, covariance = (data[n].values for n in (*_UNITS, "covariance"))
+            features = Features(R, k, L, offset, covariance, extras)
+            return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
+    except (OSError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: not a readable table of features ({error})") from error
+
+
+def compile_everything(actuator: Mapping[str, Any], output: str | Path) -> None:
+    """Run a short simulation and every reconstruction once, which compiles them and fills the cache of compiled code.
+
+    Parameters
+    ----------
+    actuator : parameters of any actuator
+    output : a text file to write, saying how long it took
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    from ..actuator.commands import command_positions
+    from ..actuator.parameters import make_runs
+    from ..actuator.sensors import SensorNoise, measure
+    from ..actuator.simulate import simulate
+    from ..reconstruction import METHODS
+
+    start = time.monotonic()
+    say("compiling the simulation, once: this takes up to a minute")
+    parameters, interval = ActuatorParameters(**actuator), 2e-4
+    command = command_positions("parabolic", {"acceleration": 1.0}, 0.5, parameters.control_period)
+    runs = make_runs(parameters, np.zeros((1, 6)))
+    noise = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
+    signals = measure(simulate(runs, command, 0.5, interval), runs, noise, 0)
+    for method in METHODS:
+        reconstruct(method, signals, interval, parameters, {})
+    text = f"compiled in {time.monotonic() - start:.1f} s\n"
+    say(text.strip())
+    replace_atomically(Path(output), lambda temporary: temporary.write_text(text))
+
+
+def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
+    """Cramer-Rao standard deviations of the first fresh runs' faults, from plateau samples and with floating ones too.
+
+    They are NaN where the bound does not hold: without noise, and under the rotor-angle laws, whose R, k carry no xi.
+
+    Parameters
+    ----------
+    spec : the sub-tree ``config.bound_spec``
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    import xarray as xr
+
+    from ..actuator.commands import command_positions
+    from ..actuator.simulate import simulate
+    from ..reconstruction.bounds import cramer_rao_bound
+
+    part = spec["dataset"]
+    recording, settings = part["recording"], dict(part["command"])
+    settings.pop("digest", None)
+    command = command_positions(
+        settings.pop("name"), settings, recording["duration"], part["actuator"]["control_period"]
+    )
+    runs, faults = sample_runs(part)
+    runs, faults = runs[: spec["runs"]], faults[: spec["runs"]]
+    actuator = ActuatorParameters(**part["actuator"])
+    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": []}
+    holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
+    for start in progress(range(0, len(runs), BLOCK), "bound", -(-len(runs) // BLOCK)):
+        if not holds:
+            for parts in found.values():
+                parts.append(np.full((len(runs[start : start + BLOCK]), 6), np.nan))
+            continue
+        clean = simulate(runs[start : start + BLOCK], command, recording["duration"], recording["interval"])
+        for name, parts in found.items():
+            choice = {"discard": spec["discard"], "floating": name == "floating"}
+            bound = cramer_rao_bound(
+                clean, recording["interval"], actuator, part["sensors"], choice, spec["magnet_coefficient"]
+            )
+            parts.append(bound.standard_error)
+    data = xr.Dataset(
+        {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
+        | {"fault": (("run", "component"), faults)},
+        {"component": list(FAULT_NAMES)},
+        {"title": "Cramer-Rao standard deviation of each fault", "Conventions": "CF-1.11"},
+    )
+    replace_atomically(Path(output), lambda temporary: data.to_netcdf(temporary, engine="netcdf4"))

@@ -1,0 +1,167 @@
+"""Estimators of a study: the closed form, the configured network over several seeds, the searched one, its export."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from ..identification.evaluation import fault_range
+from ..identification.identifier import Fit, fit_identifier
+from ..identification.search import SearchSettings, choose, run_worker, summarise
+from ..progress import progress, say
+from ..recording import replace_atomically
+from .features import FeatureTable, read_features
+
+HISTORY = "history.json"
+
+
+def write_json(path: str | Path, value: Any) -> None:
+    """Write plain values as readable JSON, whole or not at all."""
+    text = json.dumps(value, indent=1, sort_keys=True)
+    replace_atomically(Path(path), lambda temporary: temporary.write_text(text + "\n"))
+
+
+def read_json(path: str | Path) -> Any:
+    """Read JSON.
+
+    Raises
+    ------
+    InputError : no such file, or not JSON
+    """
+    try:
+        return json.loads(Path(path).read_text())
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from error
+
+
+def write_yaml(path: str | Path, value: Any) -> None:
+    """Write plain values as YAML, whole or not at all."""
+    from omegaconf import OmegaConf
+
+    text = OmegaConf.to_yaml(OmegaConf.create(value))
+    replace_atomically(Path(path), lambda temporary: temporary.write_text(text))
+
+
+def width_of(faults: Mapping[str, Any]) -> np.ndarray:
+    """(6,) range of each fault component, what errors are divided by."""
+    N, xi, dT = ((faults[key]["low"], faults[key]["high"]) for key in ("N", "xi", "dT"))
+    return fault_range(N, xi, dT)
+
+
+def seed_folder(folder: str | Path, seed: int) -> Path:
+    """Where the identifier of one seed is kept."""
+    return Path(folder) / f"seed_{seed}"
+
+
+def _fit(estimator: str, table: FeatureTable, spec: Mapping[str, Any], seed: int) -> Fit:
+    return fit_identifier(
+        estimator,
+        table.inputs,
+        table.faults,
+        ActuatorParameters(**spec["actuator"]),
+        alpha_m=spec["magnet_coefficient"],
+        covariance=table.covariance,
+        network=spec.get("network"),
+        training=spec.get("training"),
+        seed=seed,
+    )
+
+
+def train_identifier(
+    estimator: str, features: str, spec: Mapping[str, Any], history: str | Path, chosen: str | None = None
+) -> None:
+    """Fit one estimator on one method's features, networks from several seeds, and save them beside ``history``.
+
+    Parameters
+    ----------
+    estimator : ``closed_form``, ``network`` (as configured) or ``searched`` (as ``chosen`` by the search)
+    history : written last; learning curves of every seed
+
+    Raises
+    ------
+    InputError : features that cannot be used, or a folder that cannot be written
+    """
+    table = read_features(features).identified()
+    settings = dict(spec)
+    if chosen:
+        settings |= {key: read_json(chosen)[key] for key in ("network", "training")}
+    folder, curves = Path(history).parent, []
+    seeds = range(1 if estimator == "closed_form" else settings["seeds"])
+    for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
+        kind = "closed_form" if estimator == "closed_form" else "network"
+        fit = _fit(kind, table, settings, seed)
+        fit.identifier.save(seed_folder(folder, seed))
+        if fit.trained:
+            curves.append([asdict(curve) for curve in fit.trained.curves])
+    plain = {key: settings.get(key) for key in ("network", "training")}
+    write_json(
+        history, {"estimator": estimator, "seeds": len(seeds), "rows": len(table.faults), "curves": curves, **plain}
+    )
+
+
+def search_settings(spec: Mapping[str, Any]) -> SearchSettings:
+    """What is searched, from the sub-tree ``config.search_spec``."""
+    search = spec["search"]
+    space = {f"{section}.{key}": values for section, part in search["space"].items() for key, values in part.items()}
+    picked = {key: search[key] for key in ("trials", "sampler", "repeats", "seed")}
+    return SearchSettings(space=space, network=spec["network"], training=spec["training"], **picked)
+
+
+def search_network(features: str, spec: Mapping[str, Any], storage: str, worker: int, output: str) -> None:
+    """Run one worker of the search until the asked number of trials is finished.
+
+    Raises
+    ------
+    InputError : an unusable storage or space
+    """
+    table = read_features(features).identified()
+    last = [-1]
+
+    def tell(finished: int, asked: int) -> None:
+        if finished != last[0] and finished % 5 == 0:
+            last[0] = finished
+            say(f"search: {finished} of {asked} trials")
+
+    ran = run_worker(
+        storage, search_settings(spec), table.inputs, table.faults, width_of(spec["faults"]), worker, progress=tell
+    )
+    write_json(output, {"worker": worker, "trials": ran})
+
+
+def choose_network(features: str, spec: Mapping[str, Any], storage: str, trials: str, chosen: str) -> None:
+    """List the finished trials and choose the smallest network among the good ones.
+
+    Raises
+    ------
+    InputError : no finished trial
+    """
+    table = read_features(features).identified()
+    found = summarise(storage, search_settings(spec), table.inputs, table.faults, width_of(spec["faults"]))
+    write_json(trials, [asdict(trial) for trial in found])
+    write_json(chosen, asdict(choose(found, spec["search"]["tolerance"])))
+
+
+def export_network(folder: str | Path, features: str, model: str, check: str) -> None:
+    """Export a trained network (its first seed) to ONNX and check it against torch on given features.
+
+    Raises
+    ------
+    InputError : a folder without a network, or a file that cannot be written
+    """
+    from ..identification.export import export_onnx
+    from ..identification.identifier import Identifier
+
+    network = Identifier.load(seed_folder(folder, 0)).network
+    if network is None:
+        raise InputError(f"{folder}: holds no network to export")
+    write_json(check, export_onnx(network, model, read_features(features).identified().inputs))
+
+
+def folders(histories: Sequence[str]) -> list[Path]:
+    """Folders of estimators from their history files."""
+    return [Path(history).parent for history in histories]

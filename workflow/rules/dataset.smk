@@ -1,0 +1,33 @@
+# Fault vectors are sampled, runs simulated and measured, and written in shards.
+
+
+def dataset_spec(wildcards):
+    return PLAN.dataset(wildcards.dataset, wildcards.part)
+
+
+rule compile_simulation:
+    output:
+        f"{RESULTS}/compiled.txt",
+    params:
+        spec=configuration.recursively_sorted(vars(configuration.reference_actuator())),
+        code=code("compile_simulation"),
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    script:
+        "../scripts/compile_simulation.py"
+
+
+rule simulate_shard:
+    input:
+        ancient(rules.compile_simulation.output),
+    output:
+        f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
+    params:
+        spec=dataset_spec,
+        code=code("simulate_shard"),
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    script:
+        "../scripts/simulate_shard.py"

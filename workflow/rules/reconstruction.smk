@@ -1,0 +1,43 @@
+# Resistances and back-EMF coefficients are reconstructed from each run, and bounded from below.
+
+
+def shards_of_part(wildcards):
+    return shards(case_of(wildcards), wildcards.part)
+
+
+def reconstruction_spec(wildcards):
+    return configuration.reconstruction_spec(case_of(wildcards).config, wildcards.method)
+
+
+def bound_spec(wildcards):
+    return configuration.bound_spec(case_of(wildcards).config)
+
+
+rule reconstruct_features:
+    input:
+        shards_of_part,
+    output:
+        f"{RESULTS}/experiments/{{case}}/features/{{part}}_{{method}}.nc",
+    params:
+        spec=reconstruction_spec,
+        code=code("reconstruct_features"),
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    script:
+        "../scripts/reconstruct_features.py"
+
+
+rule compute_bound:
+    input:
+        ancient(rules.compile_simulation.output),
+    output:
+        f"{RESULTS}/experiments/{{case}}/bound.nc",
+    params:
+        spec=bound_spec,
+        code=code("compute_bound"),
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    script:
+        "../scripts/compute_bound.py"

@@ -1,0 +1,16 @@
+"""Evaluate every estimator on fresh runs."""
+
+from emafault.progress import one_line_errors
+from emafault.study.evaluation import evaluate_identification
+
+with one_line_errors():
+    given, out = snakemake.input, snakemake.output
+    evaluate_identification(
+        given.histories,
+        given.fresh,
+        given.references,
+        given.bound[0],
+        snakemake.params.spec,
+        out.metrics,
+        out.estimates,
+    )

@@ -1,0 +1,10 @@
+"""Export a trained network to ONNX."""
+
+from pathlib import Path
+
+from emafault.progress import one_line_errors
+from emafault.study.networks import export_network
+
+with one_line_errors():
+    folder = Path(snakemake.input.history).parent
+    export_network(folder, snakemake.input.features, snakemake.output.model, snakemake.output.check)

@@ -1,0 +1,10 @@
+"""Train one estimator on one method's features."""
+
+from emafault.progress import one_line_errors
+from emafault.study.networks import train_identifier
+
+with one_line_errors():
+    chosen = snakemake.input.chosen or None
+    train_identifier(
+        snakemake.wildcards.estimator, snakemake.input.features, snakemake.params.spec, snakemake.output[0], chosen
+    )
