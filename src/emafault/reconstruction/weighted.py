@@ -1,0 +1,214 @@
+"""Generalised least squares in volts, phase by phase, on samples chosen by rotor angle.
+
+V_j = R_j i_j + k_j f w + L_j di_j/dt + c_j on the plateau, f = +-1; and, as an option, V_j = k_j f w where the terminal
+floats. R_j, k_j, L_j and c_j are unknown; c_j takes up what a current sensor's offset leaves. di/dt comes from the
+currents at the ends of the interval. A record without them falls back on the mean of neighbouring mean currents: the
+switching ripple that this misses, hysteresis/sqrt(3) rms at each end, then counts as noise of the end current, and L is
+held near nominal (30 %).
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from .features import Features, Signals, check_number, read_settings
+from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, NoiseLevels, PhaseFit, fit_phase, join_phases
+from .rows import Rows, SampleChoice, phase_rows
+
+LOOSE_INDUCTANCE = 0.3  # relative standard deviation of L where di/dt is not measured
+QUIET = NoiseLevels(voltage=1e-6, current=0.0, current_end=0.0, speed=0.0)
+
+
+@dataclass(frozen=True)
+class WeightedSettings:
+    """Settings of ``weighted``."""
+
+    discard: float = 0.0  # s, dropped at the start
+    margin: float = 2.0  # electrical degrees kept clear of the plateau's corners
+    plateau_width: float = 120.0  # electrical degrees
+    floating: bool = False  # use floating-phase samples too
+    zero_current: float = 0.2  # A, largest measured current that may count as zero
+    noise: Mapping[str, float] | None = None  # voltage, current, current_end, speed (SI, 1 sigma); None estimates them
+
+
+@dataclass(frozen=True)
+class RunFit:
+    """The three phases' fits of one run, with the samples and noise levels that they rest on."""
+
+    run: int
+    rows: list[Rows]
+    phases: list[PhaseFit]
+    noise: NoiseLevels
+
+
+def check_settings(s: WeightedSettings, method: str) -> None:
+    """Refuse impossible values.
+
+    Raises
+    ------
+    InputError : naming the key, its value and what is accepted
+    """
+    check_number(method, "discard", s.discard, 0.0)
+    check_number(method, "plateau_width", s.plateau_width, 30.0, 180.0)
+    check_number(method, "margin", s.margin, 0.0, 0.5 * s.plateau_width - 1.0)
+    check_number(method, "zero_current", s.zero_current, 0.0)
+
+
+def sample_choice(s: WeightedSettings, interval: float, actuator: ActuatorParameters) -> SampleChoice:
+    """Rules for choosing samples from settings in degrees and seconds."""
+    return SampleChoice(
+        pole_pairs=float(actuator.pole_pairs),
+        plateau_width=float(np.deg2rad(s.plateau_width)),
+        margin=float(np.deg2rad(s.margin)),
+        first=round(s.discard / interval),
+        floating=bool(s.floating),
+        zero_current=s.zero_current,
+    )
+
+
+def stated_noise(noise: Mapping[str, Any]) -> NoiseLevels:
+    """Noise levels from settings; entries of other sensors are ignored.
+
+    Raises
+    ------
+    InputError : a level that is missing or negative
+    """
+    for key in ("voltage", "current", "current_end", "speed"):
+        if not noise.get(key, -1.0) >= 0.0:
+            raise InputError(
+                f"reconstruction.noise.{key}: got {noise.get(key)!r}, a standard deviation >= 0 is accepted"
+            )
+    quiet = QUIET.voltage
+    return NoiseLevels(
+        max(float(noise["voltage"]), quiet), *(float(noise[key]) for key in ("current", "current_end", "speed"))
+    )
+
+
+def end_currents(signals: Signals) -> np.ndarray:
+    """(run, time, phase) currents at the interval's end (A), from neighbouring means where they are not recorded."""
+    if signals.current_end is not None:
+        return signals.current_end
+    end = signals.current.copy()
+    end[:, :-1] = 0.5 * (signals.current[:, :-1] + signals.current[:, 1:])
+    return end
+
+
+def estimate_noise(signals: Signals, run: int, rows: list[Rows], start: np.ndarray, L: float) -> NoiseLevels:
+    """Noise levels of one run from the record itself.
+
+    Currents: scatter where the phase floats. Speed: its difference from the turned angle, whose own noise shows as
+    the covariance of neighbours. Voltage: what remains of the residual of a first fit.
+    """
+    quiet_i, quiet_end = [], []
+    for j, r in enumerate(rows):
+        zero = r.index[r.floating]
+        if len(zero) > 10:
+            quiet_i.append(np.var(signals.current[run, zero, j]))
+            if signals.current_end is not None:
+                quiet_end.append(np.var(signals.current_end[run, zero, j]))
+    difference = signals.speed[run, 1:] - np.diff(signals.angle[run]) / signals.interval
+    difference = difference - np.mean(difference)
+    speed = np.mean(difference**2) + 2.0 * np.mean(difference[1:] * difference[:-1])
+    current = float(np.mean(quiet_i)) if quiet_i else 0.0
+    end = float(np.mean(quiet_end)) if quiet_end else 0.0
+    guess = NoiseLevels(0.05, np.sqrt(current), np.sqrt(end), np.sqrt(max(speed, 0.0)))
+    remaining, lagged = [], []
+    for r in rows:
+        fit = fit_phase(r, r.f[:, None], start, guess, signals.interval)
+        if fit is None:
+            continue
+        own = fit.residual[~r.floating]
+        linked = r.linked[~r.floating]
+        lagged.append(-np.mean(own[linked] * np.roll(own, 1)[linked]) if np.any(linked) else 0.0)
+        slow = (fit.beta[EMF] * guess.speed) ** 2 + (fit.beta[CURRENT] * guess.current) ** 2
+        remaining.append(np.mean(own**2) - slow)
+    if not remaining:
+        return guess
+    if not quiet_end:
+        end = max(float(np.mean(lagged)), 0.0) * (signals.interval / L) ** 2
+    voltage = float(np.mean(remaining)) - 2.0 * end * (L / signals.interval) ** 2
+    return NoiseLevels(
+        float(np.sqrt(max(voltage, QUIET.voltage**2))), float(np.sqrt(current)), float(np.sqrt(end)), guess.speed
+    )
+
+
+def nominal_start(actuator: ActuatorParameters, unknowns: int = 4) -> np.ndarray:
+    """(unknown,) nominal R, k, L and zeros."""
+    start = np.zeros(unknowns)
+    start[[CURRENT, EMF, DIDT]] = actuator.resistance, actuator.back_emf, actuator.inductance
+    return start
+
+
+def run_noise(
+    s: WeightedSettings, signals: Signals, end: np.ndarray, run: int, actuator: ActuatorParameters, choice: SampleChoice
+) -> NoiseLevels:
+    """Stated or estimated noise levels of one run, with the ripple as noise of end currents that are not recorded."""
+    if s.noise is not None:
+        noise = stated_noise(s.noise)
+    else:
+        both = SampleChoice(**(choice.__dict__ | {"floating": True}))
+        rows = [phase_rows(signals, end, run, j, both) for j in range(3)]
+        noise = estimate_noise(signals, run, rows, nominal_start(actuator), actuator.inductance)
+    if signals.current_end is None:
+        ripple = actuator.hysteresis / np.sqrt(3.0)
+        noise = NoiseLevels(noise.voltage, noise.current, float(np.hypot(ripple, noise.current)), noise.speed)
+    return noise
+
+
+def fit_runs(
+    signals: Signals,
+    actuator: ActuatorParameters,
+    s: WeightedSettings,
+    shapes: Callable[[Rows], np.ndarray],
+    harmonics: int = 0,
+) -> tuple[Features, Iterator[RunFit]]:
+    """Fit every run; returns features to be filled and an iterator that fills them run by run.
+
+    Parameters
+    ----------
+    shapes : rows -> (row, 1 + harmonics), see ``least_squares.fit_phase``
+    """
+    choice = sample_choice(s, signals.interval, actuator)
+    end = end_currents(signals)
+    prior_L = np.inf if signals.current_end is not None else LOOSE_INDUCTANCE * actuator.inductance
+    start = nominal_start(actuator, 4 + harmonics)
+    R, k, L, offset, chi2 = (np.full((signals.runs, 3), np.nan) for _ in range(5))
+    samples = np.zeros((signals.runs, 3), np.int64)
+    covariance = np.full((signals.runs, 6, 6), np.nan)
+    out = Features(R, k, L, offset, covariance, {"chi2": chi2, "samples": samples})
+
+    def fill() -> Iterator[RunFit]:
+        for run in range(signals.runs):
+            noise = run_noise(s, signals, end, run, actuator, choice)
+            rows = [phase_rows(signals, end, run, j, choice) for j in range(3)]
+            samples[run] = [len(r.V) for r in rows]
+            fits = [fit_phase(r, shapes(r), start, noise, signals.interval, prior_L) for r in rows]
+            known = [fit for fit in fits if fit is not None]
+            if len(known) < 3:
+                continue
+            for array, column in ((R, CURRENT), (k, EMF), (L, DIDT), (offset, INTERCEPT)):
+                array[run] = [fit.beta[column] for fit in known]
+            chi2[run] = [fit.chi2 for fit in known]
+            covariance[run] = join_phases(known, rows, (CURRENT, EMF))
+            yield RunFit(run, rows, known, noise)
+
+    return out, fill()
+
+
+def reconstruct_weighted(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
+    """Generalised R, k, L and intercept of each phase with their covariance.
+
+    ``extras``: ``chi2`` (run, phase) residual variance over the one expected from the noise levels, and ``samples``
+    (run, phase).
+    A run that leaves an unknown of any phase undetermined is NaN throughout.
+    """
+    s = read_settings(WeightedSettings, settings, "weighted")
+    check_settings(s, "weighted")
+    features, fits = fit_runs(signals, actuator, s, lambda rows: rows.f[:, None])
+    for _ in fits:
+        pass
+    return features
