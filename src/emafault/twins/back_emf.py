@@ -1,0 +1,249 @@
+"""Open-circuit back-EMF of a motor turned from outside, one oscilloscope channel per phase.
+
+Base model, theta the electrical angle of the first channel's fundamental, one k for all phases, sine shape:
+    v_c = k w sin(theta - c 120 deg s),  s the phase sequence
+The statistics are the harmonics of each channel over the electrical turn (order 0 is the offset).
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from emafault.errors import InputError
+from emafault.gap.twin import Cell, Hypothesis
+from emafault.twins.measured import (
+    Arrays,
+    Block,
+    Distortion,
+    MeasuredTwin,
+    freedom,
+    nuisance,
+    read_arrays,
+    require_finite,
+)
+
+NAME = "back_emf"
+ORDERS = 13  # highest harmonic
+ACCURACY = 0.003  # of the first channel's fundamental: vertical resolution and linearity of the scope
+POLE_PAIRS = 7  # where the name of a recording gives no speed from which to find them
+SHAPE = (2, 3, 5, 7, 11, 13)  # harmonics that the shape of the magnet's field may have
+
+
+def read(path: Path) -> dict[str, Arrays]:
+    """Recordings ``t_NAME``, ``v_NAME`` of one .npz file as one case.
+
+    Raises
+    ------
+    InputError
+        when there is no such pair, shapes do not fit, or values are not finite.
+    """
+    arrays = read_arrays(path)
+    names = [key[2:] for key in arrays if key.startswith("t_")]
+    if not names:
+        raise InputError(f"{path}: no recording; needed are arrays t_NAME (s) and v_NAME (V, shape (samples, 3))")
+    for name in names:
+        if f"v_{name}" not in arrays:
+            raise InputError(f"{path}: array 'v_{name}' is missing")
+        if arrays[f"v_{name}"].ndim != 2 or arrays[f"v_{name}"].shape[1] != 3:
+            raise InputError(f"{path}: 'v_{name}' has shape {arrays[f'v_{name}'].shape}, needed is (samples, 3)")
+        require_finite(path, arrays, (f"t_{name}", f"v_{name}"), rows=200)
+    return {Path(path).name.split(".")[0]: {key: v for key, v in arrays.items() if key[2:] in names}}
+
+
+def fundamental(t: np.ndarray, v: np.ndarray) -> float:
+    """Electrical frequency (Hz) that explains most of all channels, each weighed by its own size.
+
+    Raises
+    ------
+    InputError
+        when less than two periods were recorded.
+    """
+    scaled = (v - v.mean(axis=0)) / v.std(axis=0)
+    step, span = (t[-1] - t[0]) / (t.size - 1), t[-1] - t[0]
+    power = (np.abs(np.fft.rfft(scaled * np.hanning(t.size)[:, None], 4 * t.size, axis=0)) ** 2).sum(axis=1)
+    first = int(4 * 1.0)  # below one period per record nothing is a frequency
+    coarse = (first + int(np.argmax(power[first:]))) / (4 * t.size * step)
+
+    def rest(f: float) -> float:
+        X = _design(t, f, 3)
+        return float(((scaled - X @ np.linalg.lstsq(X, scaled, rcond=None)[0]) ** 2).sum())
+
+    bounds = (coarse - 0.5 / span, coarse + 0.5 / span)
+    f = minimize_scalar(rest, bounds=bounds, method="bounded", options={"xatol": 1e-6 / span}).x
+    if f * span < 2:
+        raise InputError(f"{f * span:.1f} electrical periods recorded, at least 2 are needed")
+    return float(f)
+
+
+def _design(t: np.ndarray, f: float, orders: int) -> np.ndarray:
+    angle = 2 * np.pi * f * t[:, None] * np.arange(1, orders + 1)
+    return np.concatenate([np.ones((t.size, 1)), np.cos(angle), np.sin(angle)], axis=1)
+
+
+def harmonics(t: np.ndarray, v: np.ndarray, f: float) -> np.ndarray:
+    """(order, phase) complex amplitudes of v = Re(c exp(i n theta)), theta zero at the first channel's rising zero."""
+    b = np.linalg.lstsq(_design(t, f, ORDERS), v, rcond=None)[0]
+    c = np.concatenate([b[:1].astype(complex), b[1 : ORDERS + 1] - 1j * b[ORDERS + 1 :]])
+    shift = np.angle(c[1, 0]) + np.pi / 2
+    return c * np.exp(-1j * shift * np.arange(ORDERS + 1))[:, None]
+
+
+def build(case: str, arrays: Arrays) -> MeasuredTwin:
+    """Twin of one file: slower recordings explore, the fastest speed confirms; at one speed the last repetition does.
+
+    Raises
+    ------
+    InputError
+        when there is only one recording: nothing is left to hold out.
+    """
+    names = [key[2:] for key in arrays if key.startswith("t_")]
+    if len(names) < 2:
+        raise InputError(f"{case}: one recording leaves nothing to hold out, at least two are needed")
+    f = {name: fundamental(arrays[f"t_{name}"], arrays[f"v_{name}"]) for name in names}
+    named = {name: int(m.group(1)) for name in names if (m := re.match(r"(\d+)rpm", name))}
+    pairs = round(float(np.median([60 * f[n] / rpm for n, rpm in named.items()]))) if named else POLE_PAIRS
+    fast = [name for name in names if f[name] > 0.95 * max(f.values())]
+    confirm = fast if len(fast) < len(names) else names[-max(1, len(names) // 3) :]
+    explore = [name for name in names if name not in confirm]
+    c = {name: harmonics(arrays[f"t_{name}"], arrays[f"v_{name}"], f[name]) for name in names}
+    first = c[explore[0]][1]
+    sequence = -np.sign(np.angle(first[1] / first[0]))
+    scale = float(np.median([np.abs(c[n][1, 0]) / (2 * np.pi * f[n] / pairs) for n in explore]))
+    blocks = {n: _block(n, arrays, f[n], c[n], 2 * np.pi * f[n] / pairs, sequence) for n in names}
+    notes = [f"{pairs} pole pairs; speeds " + ", ".join(f"{n} {60 * f[n] / pairs:.1f} 1/min" for n in names)]
+    notes += [
+        f"{n}: the waveform says {60 * f[n] / pairs:.0f} 1/min, the name {rpm}"
+        for n, rpm in named.items() if abs(60 * f[n] / pairs / rpm - 1) > 0.02
+    ]  # fmt: skip
+    notes.append("a small difference of a channel's gain and of a phase's k look alike at open circuit")
+    return MeasuredTwin(
+        NAME,
+        case,
+        tuple(explore),
+        tuple(confirm),
+        blocks,
+        _parameters(scale),
+        _hypotheses(),
+        _model,
+        notes=tuple(notes),
+    )
+
+
+def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, sequence: float) -> Block:
+    t, v = arrays[f"t_{name}"], arrays[f"v_{name}"]
+    # scatter between stretches of whole electrical periods is the repeatability of each coefficient
+    periods = int(f * (t[-1] - t[0]))
+    parts = min(8, max(2, periods // 2))
+    length = int(periods / parts / f / ((t[-1] - t[0]) / (t.size - 1)))
+    pieces = np.stack([harmonics(t[s], v[s], f) for s in (slice(k * length, (k + 1) * length) for k in range(parts))])
+    scatter = pieces.real.var(axis=0, ddof=1) / parts, pieces.imag.var(axis=0, ddof=1) / parts
+    size = np.abs(c[1])[None, :]
+    cells, observed, variance, order, phase, part = [], [], [], [], [], []
+    for channel in range(3):
+        for n in range(ORDERS + 1):
+            for k, values in enumerate((c.real, c.imag)):
+                if (n == 0 and k == 1) or (n == 1 and channel == 0 and k == 0):
+                    continue  # no imaginary offset; the first channel's phase defines the angle
+                equation = "sensor_voltage" if n == 0 else f"electrical_{'abc'[channel]}"
+                cells.append(Cell(name, equation, "order", n, n, f"channel {channel + 1}, {('cos', 'sin')[k]}"))
+                observed.append(values[n, channel])
+                # an instrument's error is in proportion to what its own channel shows
+                variance.append(scatter[k][n, channel] + (ACCURACY * size[0, channel]) ** 2)
+                order.append(n)
+                phase.append(channel)
+                part.append(k)
+    inputs = {"order": np.array(order), "phase": np.array(phase), "part": np.array(part)}
+    inputs |= {"w": np.full(len(order), omega), "sequence": np.full(len(order), sequence)}
+    return Block(cells, np.array(observed), np.diag(variance), inputs)
+
+
+def _parameters(scale: float):
+    found = [nuisance("k", "V s/rad", scale, 0.3 * scale, low=0.0)]
+    for c in "abc":
+        found.append(freedom(f"channel_gain_{c}", f"decades_{c}", "1", 0.7, -2.5, 2.5))
+    found += [freedom("phase_gain", f"k_{c}", "1", 0.02, -0.3, 0.3) for c in "bc"]
+    found += [freedom("phase_angle", f"angle_{c}", "rad", 0.02, -0.5, 0.5) for c in "bc"]
+    found += [freedom("channel_offset", f"offset_{c}", "V", 0.2, -5.0, 5.0) for c in "abc"]
+    for n in SHAPE:
+        found += [freedom(f"shape_{n}", f"{part}_{n}", "1", 0.03, -0.5, 0.5) for part in ("cos", "sin")]
+    found.append(freedom("flux_loss", "droop", "s/rad", 0.001, -0.02, 0.02))
+    return tuple(found)
+
+
+def _hypotheses():
+    electrical = ("electrical_a", "electrical_b", "electrical_c")
+    # a wrong probe setting is a power of ten, so a fit starts there too
+    starts = ((0.0,), (-1.0,), (1.0,))
+    return (
+        *(
+            Hypothesis(f"channel_gain_{c}", (f"electrical_{c}",), (f"decades_{c}",), starts, kind="calibration")
+            for c in "abc"
+        ),
+        Hypothesis("phase_gain", electrical[1:], ("k_b", "k_c"), ((0.0, 0.0),)),
+        Hypothesis("phase_angle", electrical[1:], ("angle_b", "angle_c"), ((0.0, 0.0),)),
+        Hypothesis(
+            "channel_offset",
+            ("sensor_voltage",),
+            ("offset_a", "offset_b", "offset_c"),
+            ((0.0, 0.0, 0.0),),
+            kind="calibration",
+        ),
+        *(Hypothesis(f"shape_{n}", electrical, (f"cos_{n}", f"sin_{n}"), ((0.0, 0.0),)) for n in SHAPE),
+        Hypothesis("flux_loss", electrical, ("droop",), ((0.0,),)),
+    )
+
+
+def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
+    """(point, statistic): real or imaginary part of each harmonic of each channel."""
+    x = block.inputs
+    order, phase = x["order"], x["phase"]
+    amplitude = p["k"] * x["w"] * (1 - p["droop"] * x["w"])
+    one = np.ones_like(amplitude)
+    gain = np.zeros_like(amplitude)
+    offset = np.zeros_like(amplitude)
+    angle = np.zeros_like(amplitude)
+    for number, c in enumerate("abc"):
+        here = phase == number
+        k = 1 + p[f"k_{c}"] if number else one
+        gain = gain + here * 10.0 ** p[f"decades_{c}"] * k
+        offset = offset + here * 10.0 ** p[f"decades_{c}"] * p[f"offset_{c}"]
+        angle = angle + here * ((p[f"angle_{c}"] if number else 0 * one) - number * x["sequence"] * 2 * np.pi / 3)
+    shape = np.where(order == 1, -1j, 0j) + np.zeros_like(amplitude)
+    for n in SHAPE:
+        shape = shape + (order == n) * (p[f"cos_{n}"] - 1j * p[f"sin_{n}"])
+    value = gain * amplitude * shape * np.exp(1j * order * angle)
+    return np.where(order == 0, offset, np.where(x["part"] == 0, value.real, value.imag))
+
+
+def distortions() -> tuple[Distortion, ...]:
+    """Known changes of a recording and what rightly names each."""
+
+    def each(a: Arrays, change) -> Arrays:
+        return {key: change(v, a["t_" + key[2:]]) if key.startswith("v_") else v for key, v in a.items()}
+
+    def gain(a: Arrays) -> Arrays:
+        return each(a, lambda v, t: v * np.array([1.0, 10.0, 1.0]))
+
+    def offset(a: Arrays) -> Arrays:
+        return each(a, lambda v, t: v + np.array([0.0, 0.0, 1.0]) * v[:, 2:].std())
+
+    def third(a: Arrays) -> Arrays:
+        return each(
+            a,
+            lambda v, t: (
+                v - 0.1 * (v - v.mean(axis=0)) * (4 * ((v - v.mean(axis=0)) / (1.42 * v.std(axis=0))) ** 2 - 3)
+            ),
+        )
+
+    def clipped(a: Arrays) -> Arrays:
+        return each(a, lambda v, t: np.column_stack([np.minimum(v[:, 0], 0.7 * v[:, 0].max()), v[:, 1], v[:, 2]]))
+
+    return (
+        Distortion("second channel ten times larger", gain, ("channel_gain_b",), "electrical_b"),
+        Distortion("offset on the third channel", offset, ("channel_offset",), "sensor_voltage"),
+        Distortion("third harmonic of 10 %", third, ("shape_3",), "electrical_a"),
+        Distortion("first channel clipped", clipped, (), "electrical_a"),
+    )

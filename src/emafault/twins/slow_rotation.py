@@ -1,0 +1,289 @@
+"""A motor turned slowly or held still at every angle: the torque-producing current over the rotor's angle.
+
+Base model (J in A s2/rad, seen as current; direction s = sign of speed):
+    i(theta) = i_f s
+Effects add waves of the orders that their cause allows; p pole pairs and N slots are found from the spectrum.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from emafault.errors import InputError
+from emafault.gap.twin import Cell, Hypothesis
+from emafault.twins.measured import (
+    Arrays,
+    Block,
+    Distortion,
+    MeasuredTwin,
+    freedom,
+    mean_variance,
+    nuisance,
+    read_arrays,
+    require_finite,
+    smooth_covariance,
+)
+
+NAME = "slow_rotation"
+BINS = 128  # of one turn
+ORDERS = 63  # highest wave per turn that the bins resolve
+COUNTS = 8192  # encoder counts of one turn
+ACCURACY = 0.02  # of the current's rms: friction of the held rotor and position of the samples
+CREEP = 0.05  # rad/s over which friction turns with the speed
+SETTLE = 0.5  # s at the start of a move
+
+
+def read(path: Path) -> dict[str, Arrays]:
+    """Maps (8192,) over the encoder counts, 0 = not visited, or moves (3, n) of time, position, current.
+
+    Raises
+    ------
+    InputError
+        when an array is neither, visits too little of the turn, or is not finite.
+    """
+    arrays = read_arrays(path)
+    if not arrays:
+        raise InputError(f"{path}: holds no array")
+    for name, values in arrays.items():
+        if values.shape != (COUNTS,) and not (values.ndim == 2 and values.shape[0] == 3 and values.shape[1] >= 500):
+            raise InputError(
+                f"{path}: {name!r} has shape {values.shape}; a map is ({COUNTS},), a move (3, n) with n >= 500"
+            )
+        require_finite(path, {name: np.atleast_2d(values).T}, (name,), rows=1)
+        theta = _samples(values)["theta"]
+        seen = np.unique((theta % (2 * np.pi) / (2 * np.pi) * BINS).astype(int)).size
+        if seen < 0.8 * BINS:
+            raise InputError(f"{path}: {name!r} visits {seen / BINS:.0%} of the turn, at least 80 % are needed")
+    return {Path(path).name.split(".")[0]: arrays}
+
+
+def _samples(values: np.ndarray) -> Arrays:
+    """Angle (rad), current (A), speed (rad/s) and acceleration (rad/s2) of the samples of a map or a move."""
+    if values.ndim == 1:
+        visited = np.flatnonzero(values)
+        zero = np.zeros(visited.size)
+        return {"theta": 2 * np.pi * visited / COUNTS, "i": values[visited], "v": zero, "a": zero, "s": zero}
+    time, position, current = values
+    theta = np.unwrap(2 * np.pi * position / COUNTS)
+    step = float(np.median(np.diff(time)))
+    grid = np.arange(time[0], time[-1], step)
+    even = np.interp(grid, time, theta)
+    window = 2 * int(0.02 / step) + 5
+    speed = np.interp(time, grid, savgol_filter(even, window, 3, deriv=1, delta=step))
+    acceleration = np.interp(time, grid, savgol_filter(even, window, 3, deriv=2, delta=step))
+    keep = time > time[0] + SETTLE
+    sign = np.tanh(speed / CREEP)
+    return {"theta": theta[keep], "i": current[keep], "v": speed[keep], "a": acceleration[keep], "s": sign[keep]}
+
+
+def _profile(sample: Arrays) -> np.ndarray:
+    """(bin,) mean current over the turn, empty bins interpolated around it."""
+    index = (sample["theta"] % (2 * np.pi) / (2 * np.pi) * BINS).astype(int) % BINS
+    count = np.bincount(index, minlength=BINS)
+    total = np.bincount(index, sample["i"], minlength=BINS)
+    seen = np.flatnonzero(count)
+    return np.interp(np.arange(BINS), seen, total[seen] / count[seen], period=BINS)
+
+
+def find_pole_pairs_and_slots(profile: np.ndarray) -> tuple[int, int]:
+    """Pole pairs and slots whose multiples carry the spectrum of a map over one turn, each order costing its noise."""
+    power = np.abs(np.fft.rfft(profile))[1 : ORDERS + 1] ** 2
+    gain = np.log1p(power / np.median(power)) - 2.0
+    order = np.arange(1, ORDERS + 1)
+    best, found = -np.inf, (1, 3)
+    for p in range(2, 22):
+        for slots in range(3, 49, 3):
+            if slots == 2 * p or slots == p:
+                continue
+            score = gain[(order % p == 0) | (order % slots == 0)].sum()
+            if score > best:
+                best, found = score, (p, slots)
+    return found
+
+
+def build(case: str, arrays: Arrays) -> MeasuredTwin:
+    """Twin of one file: the first recordings explore, the later half confirm.
+
+    Raises
+    ------
+    InputError
+        when there is only one recording.
+    """
+    names = list(arrays)
+    if len(names) < 2:
+        raise InputError(f"{case}: one recording leaves nothing to hold out, at least two are needed")
+    samples = {name: _samples(values) for name, values in arrays.items()}
+    cut = max(1, len(names) // 2)
+    first = _profile(samples[names[0]])
+    pairs, slots = find_pole_pairs_and_slots(first)
+    size = float(first.std())
+    notes = [f"spectrum of {names[0]}: {pairs} pole pairs, {slots} slots"]
+    blocks = {}
+    for name in names:
+        # a map carries no direction of its own: a name that ends in r says that it was taken in reverse
+        direction = None if arrays[name].ndim == 2 else (-1.0 if name.endswith("r") else 1.0)
+        turn = _shift(first, _profile(samples[name])) if name != names[0] else 0
+        if turn:
+            notes.append(f"{name}: zero angle turned by {360 * turn / BINS:.0f} deg against {names[0]}")
+        samples[name]["theta"] = samples[name]["theta"] + 2 * np.pi * turn / BINS
+        blocks[name] = _block(name, samples[name], direction, size)
+    moving = any(values.ndim == 2 for values in arrays.values())
+    model = partial(_model, families=_families(pairs, slots), pairs=pairs)
+    return MeasuredTwin(
+        NAME, case, tuple(names[:cut]), tuple(names[cut:]), blocks, _parameters(size, pairs, slots, moving),
+        _hypotheses(pairs, slots, moving), model, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _shift(first: np.ndarray, other: np.ndarray) -> int:
+    """Bins by which ``other`` must be turned to lie best on ``first``."""
+    a, b = np.fft.rfft(first - first.mean()), np.fft.rfft(other - other.mean())
+    return int(np.argmax(np.fft.irfft(a * np.conj(b), BINS)))
+
+
+def _block(name: str, sample: Arrays, direction: float | None, size: float) -> Block:
+    angle = sample["theta"] % (2 * np.pi)
+    index = (angle / (2 * np.pi) * BINS).astype(int) % BINS
+    rows = {b: np.flatnonzero(index == b) for b in np.unique(index)}
+    rows = {b: r for b, r in rows.items() if r.size >= 2}
+    width = 2 * np.pi / BINS
+    cells = [Cell(name, "torque", "rotor_angle", b * width, (b + 1) * width, "mean current") for b in rows]
+    observed = np.array([sample["i"][r].mean() for r in rows.values()])
+    order = np.arange(ORDERS + 1)[:, None]
+    waves = [np.exp(1j * order * sample["theta"][r]).mean(axis=1) for r in rows.values()]
+    inputs = {
+        "cos": np.array([w.real for w in waves]).T,
+        "sin": np.array([w.imag for w in waves]).T,
+        "v": np.array([sample["v"][r].mean() for r in rows.values()]),
+        "a": np.array([sample["a"][r].mean() for r in rows.values()]),
+        "direction": np.array([sample["s"][r].mean() if direction is None else direction for r in rows.values()]),
+    }
+    variance = np.array([mean_variance(sample["i"][r]) for r in rows.values()])
+    place = np.array(list(rows)) * width
+    covariance = smooth_covariance(place, ACCURACY * size, 2 * width) + np.diag(variance)
+    return Block(cells, observed, covariance, inputs)
+
+
+def _families(pairs: int, slots: int) -> dict[str, tuple[int, ...]]:
+    """Orders (waves per turn) that each cause allows, up to what the bins resolve."""
+
+    def up_to(values) -> tuple[int, ...]:
+        return tuple(n for n in values if n <= ORDERS)
+
+    full = int(np.lcm(2 * pairs, slots))
+    return {
+        # a constant stator current or a field from outside meets the rotor's poles once per pole pair
+        "current_offset": (pairs,),
+        "stray_field": up_to(range(pairs, ORDERS + 1, 2 * pairs)),
+        "stator_asymmetry": up_to(n for n in range(2 * pairs, ORDERS + 1, 2 * pairs) if n % full),
+        "rotor_asymmetry": up_to(n for n in range(slots, ORDERS + 1, slots) if n % full),
+        "cogging": up_to(range(full, ORDERS + 1, full)),
+        "eccentricity": (1, 2),
+    }
+
+
+def _parameters(size: float, pairs: int, slots: int, moving: bool):
+    found = [
+        nuisance("i_f", "A", 0.3 * size, size, low=0.0),
+        freedom("mean_offset", "i_0", "A", 0.3 * size, -10 * size, 10 * size),
+    ]
+    for effect, orders in _families(pairs, slots).items():
+        for n in orders:
+            found += [
+                freedom(effect, f"{effect}_{part}_{n}", "A", 0.7 * size, -10 * size, 10 * size)
+                for part in ("cos", "sin")
+            ]
+    # a gain error between phases makes a ripple in proportion to the current itself
+    found += [freedom("current_gain", f"current_gain_{part}", "1", 0.03, -0.2, 0.2) for part in ("cos", "sin")]
+    if moving:
+        found += [
+            freedom("inertia", "J", "A s2/rad", 0.02 * size, 0.0, size),
+            freedom("viscous_friction", "b", "A s/rad", 0.3 * size, 0.0, 10 * size),
+        ]
+    return tuple(found)
+
+
+def _hypotheses(pairs: int, slots: int, moving: bool):
+    torque = ("torque",)
+    found = [Hypothesis("mean_offset", torque, ("i_0",), ((0.0,),), kind="calibration")]
+    for effect, orders in _families(pairs, slots).items():
+        names = tuple(f"{effect}_{part}_{n}" for n in orders for part in ("cos", "sin"))
+        equations = ("sensor_current", "torque") if effect == "current_offset" else torque
+        if names:
+            found.append(Hypothesis(effect, equations, names, ((0.0,) * len(names),)))
+    found.append(
+        Hypothesis(
+            "current_gain",
+            ("sensor_current",),
+            ("current_gain_cos", "current_gain_sin"),
+            ((0.0, 0.0),),
+            kind="calibration",
+        )
+    )
+    if moving:
+        found.append(Hypothesis("inertia", torque, ("J",), ((0.0,),)))
+        found.append(Hypothesis("viscous_friction", torque, ("b",), ((0.0,),)))
+    return tuple(found)
+
+
+def _model(
+    p: Mapping[str, np.ndarray], block: Block, families: Mapping[str, tuple[int, ...]], pairs: int
+) -> np.ndarray:
+    """(point, statistic): mean current in each bin of the rotor's angle."""
+    x = block.inputs
+    current = p["i_f"] * x["direction"] + p["i_0"]
+    for effect, orders in families.items():
+        for n in orders:
+            current = current + p[f"{effect}_cos_{n}"] * x["cos"][n] + p[f"{effect}_sin_{n}"] * x["sin"][n]
+    if "J" in p:
+        current = current + p["J"] * x["a"] + p["b"] * x["v"]
+    second = 2 * pairs
+    if second <= ORDERS:
+        current = current * (1 + p["current_gain_cos"] * x["cos"][second] + p["current_gain_sin"] * x["sin"][second])
+    return current
+
+
+def distortions() -> tuple[Distortion, ...]:
+    """Known changes of a recording and what rightly names each."""
+
+    def each(a: Arrays, change) -> Arrays:
+        """Apply change(current, theta, size) to the current of maps (where visited) and moves."""
+        size = float(np.median([_samples(v)["i"].std() for v in a.values()]))
+        result = {}
+        for name, values in a.items():
+            if values.ndim == 1:
+                theta = 2 * np.pi * np.arange(COUNTS) / COUNTS
+                result[name] = np.where(values != 0, change(values, theta, size), 0.0)
+            else:
+                theta = 2 * np.pi * values[1] / COUNTS
+                result[name] = np.stack([values[0], values[1], change(values[2], theta, size)])
+        return result
+
+    def orders(a: Arrays) -> tuple[int, int]:
+        return find_pole_pairs_and_slots(_profile(_samples(next(iter(a.values())))))
+
+    def external(a: Arrays) -> Arrays:
+        n = orders(a)[0]
+        return each(a, lambda i, theta, size: i + 2 * size * np.cos(n * theta + 0.5))
+
+    def magnets(a: Arrays) -> Arrays:
+        n = orders(a)[1]
+        return each(a, lambda i, theta, size: i + size * np.sin(n * theta))
+
+    def eccentric(a: Arrays) -> Arrays:
+        return each(a, lambda i, theta, size: i + 0.5 * size * np.cos(theta))
+
+    def alien(a: Arrays) -> Arrays:
+        p, slots = orders(a)
+        n = next(n for n in range(17, ORDERS) if n % p and n % slots)
+        return each(a, lambda i, theta, size: i + 0.5 * size * np.cos(n * theta))
+
+    return (
+        Distortion("wave once per pole pair", external, ("current_offset", "stray_field"), "torque"),
+        Distortion("wave once per slot", magnets, ("rotor_asymmetry",), "torque"),
+        Distortion("wave once per turn", eccentric, ("eccentricity",), "torque"),
+        Distortion("wave of an order that no cause has", alien, (), "torque"),
+    )
