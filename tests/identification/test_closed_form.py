@@ -27,6 +27,10 @@ def test_magnets_that_lag_bias_an_inverse_that_assumes_they_do_not(actuator):
     R, k = closed_form.forward(FAULTS, actuator, -1.1e-3, FAULTS[:, 5] - 20.0)
     error = closed_form.inverse(R, k, actuator, -1.1e-3) - FAULTS
     assert np.all(np.abs(error[:, 5]) > 2.0)
+    np.testing.assert_allclose(closed_form.inverse(R, k, actuator, -1.1e-3, lag=20.0), FAULTS, atol=1e-11)
+    R, k = closed_form.forward(FAULTS, actuator, -1.1e-3, FAULTS[:, 5] - 20.0, "rotor_angle")
+    got = closed_form.inverse_rotor_angle(R, k, FAULTS[:, 3:5], actuator, -1.1e-3, lag=20.0)
+    np.testing.assert_allclose(got, FAULTS, atol=1e-9)
 
 
 def test_permuting_phases_permutes_the_turns_and_turns_the_eccentricity(actuator):

@@ -12,6 +12,8 @@ from emafault.identification.export import export_onnx
 from emafault.identification.identifier import Identifier, fit_identifier, nominal_features
 from emafault.identification.intervals import ConformalIntervals, coverage
 
+from .conftest import NOISE
+
 SETTINGS = {"network": {"coordinates": "log", "width": 8}, "training": {"reweight": 1, "epochs": 60}}
 
 
@@ -120,11 +122,24 @@ def test_calibration_undoes_a_units_tolerance(fitted, fresh, actuator, width):
         fresh.features * scale, fresh.faults, fresh.covariance * np.outer(scale, scale), fresh.bound
     )
     for fit in fitted.values():
-        both = evaluation.unit_tolerance(fit.identifier, off, unit, width)
+        nominal = evaluation.evaluate(fit.identifier, off, width)
+        calibrated = evaluation.evaluate(fit.identifier, off, width, unit=unit)
         straight = evaluation.evaluate(fit.identifier, fresh, width)
-        assert both["calibrated"]["errors"]["dT"]["mae"] == pytest.approx(straight["errors"]["dT"]["mae"], rel=1e-6)
-        assert both["calibrated"]["coverage"]["mean"] == pytest.approx(straight["coverage"]["mean"], abs=1e-9)
-        assert both["uncalibrated"]["errors"]["dT"]["mae"] > 2.5
+        assert calibrated["errors"]["dT"]["mae"] == pytest.approx(straight["errors"]["dT"]["mae"], rel=1e-6)
+        assert calibrated["coverage"]["mean"] == pytest.approx(straight["coverage"]["mean"], abs=1e-9)
+        assert nominal["errors"]["dT"]["mae"] > 2.5
+
+
+def test_intervals_know_that_a_reference_record_is_noisy_too(fitted, fresh, actuator, width):
+    healthy = nominal_features(actuator)
+    covariance = np.kron(NOISE, np.eye(3)) * np.outer(healthy, healthy)
+    rng = np.random.default_rng(8)
+    unit = rng.multivariate_normal(healthy, covariance, len(fresh.faults))
+    for fit in fitted.values():
+        told = evaluation.evaluate(fit.identifier, fresh, width, 0.9, unit, covariance)
+        untold = evaluation.evaluate(fit.identifier, fresh, width, 0.9, unit)
+        assert abs(told["coverage"]["mean"] - 0.9) < 0.03
+        assert untold["coverage"]["mean"] < 0.8
 
 
 def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):

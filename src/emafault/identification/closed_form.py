@@ -44,8 +44,10 @@ def forward(
     return R, k
 
 
-def inverse(R: np.ndarray, k: np.ndarray, actuator: ActuatorParameters, alpha_m: float = 0.0) -> np.ndarray:
-    """Faults from resistances and back-EMF coefficients under ``stator_fixed``, magnets at the winding's temperature.
+def inverse(
+    R: np.ndarray, k: np.ndarray, actuator: ActuatorParameters, alpha_m: float = 0.0, lag: float = 0.0
+) -> np.ndarray:
+    """Faults from resistances and back-EMF coefficients under ``stator_fixed``, magnets at dT - lag.
 
     The mean of g_j over the phases is 1, so s = c/m = 3/sum(q_j/r_j); the rest follows phase by phase.
 
@@ -53,6 +55,8 @@ def inverse(R: np.ndarray, k: np.ndarray, actuator: ActuatorParameters, alpha_m:
     ----------
     R, k : (run, 3) ohm, V s/rad; any leading shape is accepted
     alpha_m : temperature coefficient of the magnets (1/K)
+    lag : by how much the magnets are colder than the winding (K); six features do not tell it, so it is prior
+        knowledge
 
     Returns
     -------
@@ -61,9 +65,9 @@ def inverse(R: np.ndarray, k: np.ndarray, actuator: ActuatorParameters, alpha_m:
     r, q = np.asarray(R) / actuator.resistance, np.asarray(k) / actuator.back_emf
     alpha = actuator.copper_coefficient
     s = 3.0 / np.sum(q / r, axis=-1)
-    dT = (s - 1.0) / (alpha - s * alpha_m)
+    dT = (s * (1.0 - alpha_m * lag) - 1.0) / (alpha - s * alpha_m)
     N = 1.0 - r / (1.0 + alpha * dT)[..., None]
-    z = q / ((1.0 - N) * (1.0 + alpha_m * dT)[..., None])
+    z = q / ((1.0 - N) * (1.0 + alpha_m * (dT - lag))[..., None])
     xi = 2.0 / 3.0 * (z - 1.0) @ ECCENTRICITY_AXES
     return np.concatenate([N, xi, dT[..., None]], axis=-1)
 
@@ -75,6 +79,7 @@ def inverse_rotor_angle(
     actuator: ActuatorParameters,
     alpha_m: float = 0.0,
     covariance: np.ndarray | None = None,
+    lag: float = 0.0,
 ) -> np.ndarray:
     """Faults from angle-resolved features, where xi is measured by itself and k_j = k0 (1 - N_j) m carries none of it.
 
@@ -85,6 +90,7 @@ def inverse_rotor_angle(
     R, k : (run, 3) ohm, V s/rad, k the part of the coefficient that does not turn with the rotor
     xi : (run, 2) static eccentricity (1)
     covariance : (run, 6, 6) of [R, k] (SI); without it equal relative errors are assumed
+    lag : as in :func:`inverse`
 
     Returns
     -------
@@ -97,12 +103,12 @@ def inverse_rotor_angle(
         weight = np.broadcast_to(np.eye(6), (*six.shape, 6))
     else:
         weight = np.linalg.inv(covariance / (six[..., :, None] * six[..., None, :]))
-    start = inverse(R, k, actuator, alpha_m)
+    start = inverse(R, k, actuator, alpha_m, lag)
     n, dT = np.log1p(-start[..., :3]), start[..., 5]
     design = np.zeros((*six.shape, 4))
     design[..., :3] = np.tile(np.eye(3), (2, 1))
     for _ in range(3):  # linear but for log c and log m in dT
-        c, m = 1.0 + alpha * dT, 1.0 + alpha_m * dT
+        c, m = 1.0 + alpha * dT, 1.0 + alpha_m * (dT - lag)
         design[..., :3, 3], design[..., 3:, 3] = (alpha / c)[..., None], (alpha_m / m)[..., None]
         residual = y - np.concatenate([n + np.log(c)[..., None], n + np.log(m)[..., None]], axis=-1)
         normal = np.swapaxes(design, -1, -2) @ weight

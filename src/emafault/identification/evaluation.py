@@ -1,6 +1,6 @@
-"""Errors of identified faults: in physical units, over range and beside the Cramer-Rao bound, over seeds."""
+"""Errors of identified faults: in physical units, over range and beside the Cramer-Rao bound."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from .identifier import Fit, Identifier
+from .identifier import Identifier
 from .intervals import coverage
 
 #: outputs that are averaged together -> their columns in the fault vector
@@ -98,8 +98,15 @@ def evaluate(
     width: np.ndarray,
     level: float = 0.9,
     unit: np.ndarray | None = None,
+    unit_covariance: np.ndarray | None = None,
 ) -> dict[str, Any]:
     """Evaluate on rows never trained on.
+
+    Parameters
+    ----------
+    width : (6,) as :func:`fault_range`
+    unit, unit_covariance : (6,) or (run, 6) R (ohm) and k (V s/rad) of each healthy unit at 20 degC, as its
+        reference records give them, and their covariance; None takes every unit for the nominal actuator
 
     Returns
     -------
@@ -112,8 +119,10 @@ def evaluate(
     if not np.all(identified):
         fresh = fresh.rows(identified)
         unit = unit if unit is None or np.ndim(unit) == 1 else np.asarray(unit)[identified]
+        if unit_covariance is not None and np.ndim(unit_covariance) == 3:
+            unit_covariance = np.asarray(unit_covariance)[identified]
     value = identifier.predict(fresh.features, fresh.covariance, unit)
-    low, high = identifier.interval(fresh.features, level, fresh.covariance, unit)
+    low, high = identifier.interval(fresh.features, level, fresh.covariance, unit, unit_covariance)
     return {
         "rows": len(value),
         "unidentified": int(np.sum(~identified)),
@@ -149,67 +158,3 @@ def over_seeds(results: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, floa
             "high": float(values.max()),
         }
     return summary
-
-
-def compare(
-    training: Mapping[str, FeatureSet],
-    fresh: Mapping[str, FeatureSet],
-    estimators: Mapping[str, Callable[[FeatureSet, int], Fit]],
-    seeds: Iterable[int],
-    width: np.ndarray,
-    level: float = 0.9,
-    few: int = 10,
-) -> list[dict[str, Any]]:
-    """Every reconstruction method with every estimator over several seeds.
-
-    Parameters
-    ----------
-    training, fresh : method -> features
-    estimators : name -> function of (training features, seed) giving a :class:`.identifier.Fit`
-    few : rows of the paper's external validation; each seed takes its own from the fresh rows
-
-    Returns
-    -------
-    one dict for each method, estimator and seed: ``method``, ``estimator``, ``seed``, ``few`` and ``all``
-    (:func:`evaluate` on the few and on all fresh rows), ``fit`` (the :class:`.identifier.Fit` itself)
-    """
-    table = []
-    for method, known in training.items():
-        new = fresh[method]
-        for name, make in estimators.items():
-            for seed in seeds:
-                fit = make(known, seed)
-                pick = np.random.default_rng([seed, 30]).choice(
-                    len(new.faults), min(few, len(new.faults)), replace=False
-                )
-                table.append(
-                    {
-                        "method": method,
-                        "estimator": name,
-                        "seed": seed,
-                        "few": evaluate(fit.identifier, new.rows(pick), width, level),
-                        "all": evaluate(fit.identifier, new, width, level),
-                        "fit": fit,
-                    }
-                )
-    return table
-
-
-def unit_tolerance(
-    identifier: Identifier, fresh: FeatureSet, unit: np.ndarray, width: np.ndarray, level: float = 0.9
-) -> dict[str, dict[str, Any]]:
-    """Errors on units off nominal, without and with calibration on a healthy reference record.
-
-    Parameters
-    ----------
-    unit : (6,) or (run, 6) R (ohm) and k (V s/rad) of each healthy unit at 20 degC, as its reference record gives
-        them
-
-    Returns
-    -------
-    ``uncalibrated`` and ``calibrated`` -> result of :func:`evaluate`
-    """
-    return {
-        "uncalibrated": evaluate(identifier, fresh, width, level),
-        "calibrated": evaluate(identifier, fresh, width, level, unit),
-    }

@@ -25,15 +25,16 @@ _FORMAT = 1
 
 @dataclass(frozen=True)
 class Identifier:
-    """Features to faults with intervals; ``features`` are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c] or, where the
+    """A trained estimator with its intervals.
 
-    reconstruction measures xi by itself, (run, 8) with xi_x and xi_y behind them. A ``unit`` is the (6,) or (run,
-    6) array of R and k of the healthy unit at 20 degC: features and covariance are scaled to the nominal actuator
-    before use.
+    Features are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c], or (run, 8) with xi_x and xi_y behind them where the
+    reconstruction measures xi by itself. A ``unit`` is the (6,) or (run, 6) array of R and k of the healthy unit at
+    20 degC: features and covariance are scaled to the nominal actuator before use.
     """
 
     actuator: ActuatorParameters
     alpha_m: float
+    lag: float  # K, expected, of the magnets behind the winding
     intervals: ConformalIntervals
     network: Network | None = None  # None: the closed form
     feature_low: np.ndarray | None = None  # (feature,) range of the rows learnt from
@@ -67,13 +68,14 @@ class Identifier:
         level: float = 0.9,
         covariance: np.ndarray | None = None,
         unit: np.ndarray | None = None,
+        unit_covariance: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Low and high end (run, 6) of the prediction interval at ``level``.
 
-        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it the calibration rows' is
-        taken.
+        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it that of the calibration
+        rows is taken. ``unit_covariance``, (6, 6) or (run, 6, 6) of ``unit``, widens them.
         """
-        features, covariance = self._nominal(features, covariance, unit)
+        features, covariance = self._nominal(features, covariance, unit, unit_covariance)
         value = _estimate(self, features, covariance)
         half = self.intervals.half_width(level, _variance(self, features, covariance), len(features))
         return value - half, value + half
@@ -84,10 +86,11 @@ class Identifier:
         level: float = 0.9,
         covariance: np.ndarray | None = None,
         unit: np.ndarray | None = None,
+        unit_covariance: np.ndarray | None = None,
     ) -> list[dict[str, dict[str, float]]]:
         """For each run {"Na": {"value": ..., "low": ..., "high": ...}, ...}."""
         value = self.predict(features, covariance, unit)
-        low, high = self.interval(features, level, covariance, unit)
+        low, high = self.interval(features, level, covariance, unit, unit_covariance)
         return [
             {
                 name: {"value": float(value[n, j]), "low": float(low[n, j]), "high": float(high[n, j])}
@@ -106,7 +109,7 @@ class Identifier:
         )
         return np.maximum(beyond.max(axis=1), 0.0)
 
-    def _nominal(self, features, covariance, unit) -> tuple[np.ndarray, np.ndarray | None]:
+    def _nominal(self, features, covariance, unit, unit_covariance=None) -> tuple[np.ndarray, np.ndarray | None]:
         features = np.atleast_2d(np.asarray(features, float))
         width = len(self.feature_low) if self.feature_low is not None else features.shape[1]
         if features.shape[1] != width or width not in (6, 8):
@@ -114,10 +117,15 @@ class Identifier:
         if covariance is not None:
             covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), 6, 6))
         if unit is not None:
-            scale = np.broadcast_to(nominal_features(self.actuator) / np.asarray(unit, float), (len(features), 6))
+            unit = np.broadcast_to(np.asarray(unit, float), (len(features), 6))
+            scale = nominal_features(self.actuator) / unit
             features = np.concatenate([features[:, :6] * scale, features[:, 6:]], axis=1)
             if covariance is not None:
                 covariance = covariance * scale[:, :, None] * scale[:, None, :]
+            if unit_covariance is not None:
+                share = features[:, :6] / unit  # an error of the unit's R or k is one of the scaled feature
+                added = np.asarray(unit_covariance, float) * share[:, :, None] * share[:, None, :]
+                covariance = added if covariance is None else covariance + added
         return features, covariance
 
     def save(self, folder: str | Path) -> None:
@@ -132,6 +140,7 @@ class Identifier:
             "estimator": self.estimator,
             "actuator": asdict(self.actuator),
             "alpha_m": self.alpha_m,
+            "lag": self.lag,
             "intervals": self.intervals.to_plain(),
             "network": self.network.to_plain() if self.network else None,
             "feature_low": None if self.feature_low is None else self.feature_low.tolist(),
@@ -158,6 +167,7 @@ class Identifier:
             return cls(
                 ActuatorParameters(**plain["actuator"]),
                 plain["alpha_m"],
+                plain["lag"],
                 ConformalIntervals.from_plain(plain["intervals"]),
                 Network.from_plain(plain["network"]) if plain["network"] else None,
                 None if low is None else np.array(low),
@@ -177,10 +187,12 @@ def nominal_features(actuator: ActuatorParameters) -> np.ndarray:
 def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
     if identifier.network is not None:
         return identifier.network.predict(features)
-    R, k, actuator, alpha_m = features[:, :3], features[:, 3:6], identifier.actuator, identifier.alpha_m
+    R, k, model = features[:, :3], features[:, 3:6], identifier
     if features.shape[1] == 8:
-        return closed_form.inverse_rotor_angle(R, k, features[:, 6:], actuator, alpha_m, covariance)
-    return closed_form.inverse(R, k, actuator, alpha_m)
+        return closed_form.inverse_rotor_angle(
+            R, k, features[:, 6:], model.actuator, model.alpha_m, covariance, model.lag
+        )
+    return closed_form.inverse(R, k, model.actuator, model.alpha_m, model.lag)
 
 
 def _variance(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> np.ndarray | None:
@@ -217,6 +229,7 @@ def fit_identifier(
     actuator: ActuatorParameters,
     *,
     alpha_m: float = 0.0,
+    lag: float = 0.0,
     covariance: np.ndarray | None = None,
     network: Mapping[str, Any] | NetworkSettings | None = None,
     training: Mapping[str, Any] | TrainingSettings | None = None,
@@ -232,6 +245,9 @@ def fit_identifier(
     ----------
     estimator : ``network`` or ``closed_form``
     features : (run, 6) or (run, 8); faults : (run, 6)
+    alpha_m, lag : the magnets' temperature coefficient (1/K) and how much colder than the winding they are expected
+        (K); the
+        closed form needs them, a network learns them
     covariance : (run, 6, 6) of R and k, to normalise the intervals; None where the reconstruction gives none
     intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the
         70/15/15 calibrates)
@@ -254,7 +270,7 @@ def fit_identifier(
     if covariance is not None and not np.all(np.isfinite(covariance)):
         covariance = None
     placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
-    identifier = Identifier(actuator, alpha_m, placeholder, None, features.min(axis=0), features.max(axis=0))
+    identifier = Identifier(actuator, alpha_m, lag, placeholder, None, features.min(axis=0), features.max(axis=0))
     trained = None
     if estimator == "network":
         trained = train(features, faults, network, training, seed)
