@@ -28,10 +28,10 @@ class Cell:
 class Parameter:
     """One parameter of the twin's model, with its prior.
 
-    Nuisances (``effect`` None) have a Gaussian prior (``mean``, ``sd``), always free. Effect parameters are off at ``off``
-    and free, with a prior of width ``sd`` about ``mean`` and hard bounds (``low``, ``high``), only in hypotheses that contain the effect.
-    ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all. ``reports`` False keeps
-    it out of the verdict.
+    Nuisances (``effect`` None) have the Gaussian prior (``mean``, ``sd``) and are always free. The parameters of an effect
+    are off at ``off`` and free, with the prior (``mean``, ``sd``) and the hard bounds (``low``, ``high``), only in hypotheses
+    that contain the effect. A nuisance may also be the subject of a calibration hypothesis, which widens its prior to the
+    bounds. ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One candidate cause: its parameters by name and the points at which a fit starts (value per parameter)."""
+    """One candidate cause: its parameters by name and the points at which a fit starts (one value per parameter)."""
 
     effect: str
     equations: tuple[str, ...]
@@ -59,14 +59,18 @@ class Hypothesis:
 
 
 class Twin(Protocol):
-    """A machine as the diagnosis sees it. ``part`` is a sequence of recording names."""
+    """A machine as the diagnosis sees it. ``part`` is a sequence of recording names.
+
+    A twin may also offer ``report(effect, values, deviations)``, which turns the parameters of an effect as fitted into those
+    of the catalogue: name -> (value, low, high, units); and ``experiments(values)``, the menu of next experiments.
+    """
 
     name: str
     parameters: Sequence[Parameter]
     hypotheses: Sequence[Hypothesis]
 
     def cells(self, part: Sequence[str]) -> list[Cell]:
-        """One cell per statistic of these recordings, in the order of the statistics."""
+        """One cell per statistic of these recordings, in the order of the statistics, recording by recording."""
 
     def observed(self, part: Sequence[str]) -> np.ndarray:
         """(statistic,) statistics of the recordings as brought."""
@@ -75,4 +79,4 @@ class Twin(Protocol):
         """(point, parameter) parameter values -> (point, statistic) expected statistics."""
 
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
-        """(statistic, statistic) covariance of the statistics at one parameter point."""
+        """(statistic, statistic) covariance of the statistics at one parameter point, block-diagonal by recording."""

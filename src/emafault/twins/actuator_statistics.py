@@ -17,7 +17,16 @@ from ..recording import Recording
 
 PHASE_EQUATIONS = ("electrical_a", "electrical_b", "electrical_c")
 #: rows of the residual array
-EQUATIONS = (*PHASE_EQUATIONS, "sensor_current", "sensor_voltage", "sensor_speed", "torque", "position", "bus", "control")
+EQUATIONS = (
+    *PHASE_EQUATIONS,
+    "sensor_current",
+    "sensor_voltage",
+    "sensor_speed",
+    "torque",
+    "position",
+    "bus",
+    "control",
+)
 SPEED_EDGES = (2.0, 8.0, 20.0, 50.0, 110.0, 1.0e9)  # rad/s
 ORDERS = (1, 2, 4, 8, 12, 24, 36, 72)  # of the mechanical turn
 ANGLE_BINS = 12
@@ -57,7 +66,9 @@ def _specification() -> list[tuple[str, str, str, float, float]]:
         ):
             out.append((label, equation, along, 0.0, 0.0))
         for b in range(ANGLE_BINS):
-            out.append((f"sector {30 * b}", equation, "rotor_angle", TWO_PI * b / ANGLE_BINS, TWO_PI * (b + 1) / ANGLE_BINS))
+            out.append(
+                (f"sector {30 * b}", equation, "rotor_angle", TWO_PI * b / ANGLE_BINS, TWO_PI * (b + 1) / ANGLE_BINS)
+            )
     for label in ("constant", "i_a", "i_b", "i_c", "floating a", "floating b", "floating c"):
         out.append((f"sum {label}", "sensor_current", "current", 0.0, 0.0))
     for label, along in (("constant", "direction"), ("sum k", "rotor_speed")):
@@ -81,7 +92,6 @@ def _specification() -> list[tuple[str, str, str, float, float]]:
     for order in ORDERS:
         for part in ("cos", "sin"):
             out.append((f"order {order} {part}", "torque", "order", float(order), float(order)))
-    out.append(("break-away", "torque", "rotor_speed", 0.0, REST_SPEED))
     for label, along in (
         ("forward", "direction"),
         ("backward", "direction"),
@@ -93,7 +103,7 @@ def _specification() -> list[tuple[str, str, str, float, float]]:
         out.append((f"play {label}", "position", along, 0.0, 0.0))
     for label, along in (("constant", "direction"), ("current", "current"), ("power", "rotor_speed")):
         out.append((f"bus {label}", "bus", along, 0.0, 0.0))
-    for label in ("level", "slope", "slope -1", "slope -2"):
+    for label in ("slope", "slope -1", "slope -2"):
         out.append((f"regulator {label}", "control", "time", 0.0, 0.0))
     for letter in "abc":
         for label in COMMUTATIONS:
@@ -112,11 +122,10 @@ _TORQUE = _SPEED + 5
 _PER_DIRECTION = 3 + len(SPEED_EDGES) - 1
 _TORQUE_REST = _TORQUE + 2 * _PER_DIRECTION
 _ORDERS = _TORQUE_REST + 3
-_BREAKAWAY = _ORDERS + 2 * len(ORDERS)
-_POSITION = _BREAKAWAY + 1
+_POSITION = _ORDERS + 2 * len(ORDERS)
 _BUS = _POSITION + 6
 _CONTROL = _BUS + 3
-_COMMUTATION = _CONTROL + 4
+_COMMUTATION = _CONTROL + 3
 LATTICE = _SPEED + 4
 OSCILLATION = _POSITION + 5
 _SPEEDS = np.array(SPEED_EDGES)
@@ -139,9 +148,7 @@ class Nominal:
 
     @classmethod
     def of(cls, actuator: ActuatorParameters, recording: Recording, theta_0: float) -> "Nominal":
-        heat = 1.0 + actuator.copper_coefficient * (
-            recording.ambient_temperature - actuator.reference_temperature
-        )
+        heat = 1.0 + actuator.copper_coefficient * (recording.ambient_temperature - actuator.reference_temperature)
         a = actuator
         constants = np.array(
             [a.resistance * heat, a.inductance, a.back_emf, a.pole_pairs, a.inertia, a.viscous_friction]
@@ -181,7 +188,9 @@ def speed_and_acceleration(theta, dt, w, acceleration, slow):
 
 
 @compiled
-def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, command, bus, y, norm, count, residual, store):
+def fill_statistics(
+    c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, command, bus, y, norm, count, residual, store
+):
     """Fill the statistics of one recording.
 
     ``c`` constants of ``Nominal``; V, i, i_end (time, phase); the rest (time,); outputs y, norm, count (statistic,),
@@ -202,7 +211,6 @@ def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, c
     integral, demand = 0.0, 0.0
     f, slope, x = np.empty(3), np.empty(3), np.empty(3)
     plateau, floating, was_off, sign = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    breakaway, broken = 0.0, False
     smooth_play, play_power = 0.0, 0.0
     for n in range(1, n_time):
         t = (n + 0.5) * dt
@@ -214,15 +222,14 @@ def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, c
         level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
         cos_1, sin_1 = np.cos(middle), np.sin(middle)
         drive, sum_r, sum_f = 0.0, 0.0, 0.0
-        sums_known = True
         for j in range(3):
             x[j] = (poles * middle - AXIS[j]) % TWO_PI
             if span < 1e-6:
                 f[j], slope[j] = trapezoid(x[j], ramp)
             else:
-                f_low, slope_low = trapezoid(x[j] - span, ramp)
+                f_low, _ = trapezoid(x[j] - span, ramp)
                 f_mid, slope[j] = trapezoid(x[j], ramp)
-                f_high, slope_high = trapezoid(x[j] + span, ramp)
+                f_high, _ = trapezoid(x[j] + span, ramp)
                 f[j] = (f_low + 4.0 * f_mid + f_high) / 6.0
             drive += k * f[j] * i[n, j]
             sum_f += f[j]
@@ -306,9 +313,6 @@ def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, c
                     part = _ORDER_LIST[o] * middle
                     _put(_ORDERS + 2 * o, n, np.cos(part), r, y, norm, count, store)
                     _put(_ORDERS + 2 * o + 1, n, np.sin(part), r, y, norm, count, store)
-            broken = True
-        elif not broken:
-            breakaway = max(breakaway, abs(drive))
         # ---- play between the rotor and the user shaft
         r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
         residual[7, n] = r
@@ -348,15 +352,14 @@ def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, c
         if n > lag + 3 and n < n_time - 1:
             r = regulator[n] - regulator[n - lag]
             residual[9, n] = r
-            _put(_CONTROL, n, 1.0 if pair_mean[n] > 0.0 else -1.0, r, y, norm, count, store)
             for m in range(3):
                 rise = pair_mean[n - m] - pair_mean[n - m - 1]
-                _put(_CONTROL + 1 + m, n, rise, r, y, norm, count, store)
+                _put(_CONTROL + m, n, rise, r, y, norm, count, store)
         # ---- currents around the commutations
-        if moving and abs(pair_mean[n]) > 0.05:
+        if moving and abs(pair_mean[n]) > 0.2:
             for j in range(3):
                 half = x[j] % np.pi
-                share = sign[j] * i[n, j] / pair_mean[n]
+                share = min(max(sign[j] * i[n, j] / pair_mean[n], -0.5), 1.5)
                 base = _COMMUTATION + 4 * j
                 if 0.0 < ramp - half < WINDOW:
                     _put(base, n, 1.0, share, y, norm, count, store)
@@ -379,9 +382,6 @@ def fill_statistics(c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, c
     y[LATTICE] = spacing if distinct < n_time // 4 else 0.0
     count[LATTICE] = n_time
     norm[LATTICE] = 1.0
-    y[_BREAKAWAY] = breakaway
-    count[_BREAKAWAY] = 1000 if broken else 0
-    norm[_BREAKAWAY] = 1.0
     y[OSCILLATION] = np.sqrt(play_power / n_time)
     count[OSCILLATION] = n_time
     norm[OSCILLATION] = 1.0

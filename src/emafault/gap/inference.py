@@ -1,0 +1,349 @@
+"""Gaussian inference on a twin's statistics: maximum a posteriori fits, Laplace evidence, signatures.
+
+With statistics y, prediction mu(theta), covariance C and Gaussian priors (m, s), a fit minimises
+Q = (y - mu)' C^-1 (y - mu) + sum ((theta - m)/s)^2; its log evidence is -Q/2 - log det(I + D J' C^-1 J D)/2 with
+D = diag(s), up to a constant that all hypotheses share.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from .twin import Hypothesis, Parameter, Twin
+
+
+@dataclass(frozen=True)
+class Point:
+    """A fitted parameter point: values (parameter,), prediction (statistic,), objective and log evidence."""
+
+    values: np.ndarray
+    prediction: np.ndarray
+    objective: float
+    misfit: float  # the data's part of the objective
+    log_evidence: float
+    free: tuple[int, ...]
+    jacobian: np.ndarray  # (statistic, free), whitened
+    covariance: np.ndarray  # (free, free)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of effects with its fit; ``gain`` is its log evidence above the empty set's."""
+
+    effects: tuple[str, ...]
+    point: Point
+    gain: float
+    refined: bool
+    start: np.ndarray
+    signature: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (statistic, parameter), whitened
+
+
+class Problem:
+    """The recordings of one part of a bench as a Gaussian inference problem on a twin."""
+
+    def __init__(self, twin: Twin, part: Sequence[str]):
+        self.twin = twin
+        self.part = tuple(part)
+        self.cells = twin.cells(self.part)
+        self.observed = twin.observed(self.part)
+        self.parameters = list(twin.parameters)
+        self.names = {p.name: m for m, p in enumerate(self.parameters)}
+        self.mean = np.array([p.mean for p in self.parameters])
+        self.sd = np.array([p.sd for p in self.parameters])
+        self.low = np.array([p.low for p in self.parameters])
+        self.high = np.array([p.high for p in self.parameters])
+        self.nuisances = [
+            m
+            for m, p in enumerate(self.parameters)
+            if p.effect is None and (p.recordings is None or set(p.recordings) & set(self.part))
+        ]
+        rows: dict[str, list[int]] = {}
+        for m, cell in enumerate(self.cells):
+            rows.setdefault(cell.recording, []).append(m)
+        self.rows = {name: np.array(r) for name, r in rows.items()}
+        self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
+
+    # ---- whitening
+    def set_covariance(self, values: np.ndarray) -> None:
+        """Take the statistics' covariance at a parameter point."""
+        cov = self.twin.covariance(values, self.part)
+        self._blocks = []
+        for rows in self.rows.values():
+            block = cov[np.ix_(rows, rows)]
+            scale = np.sqrt(np.diag(block))
+            correlation = block / np.outer(scale, scale)
+            # a correlation known from finitely many numbers is never trusted to the last digit
+            correlation = 0.98 * correlation + 0.02 * np.eye(len(rows))
+            self._blocks.append((rows, scale[:, None] * np.linalg.cholesky(correlation)))
+
+    def whiten(self, x: np.ndarray) -> np.ndarray:
+        """C^-1/2 x for (statistic,) or (statistic, column)."""
+        out = np.empty_like(x, dtype=float)
+        for rows, factor in self._blocks:
+            out[rows] = solve_triangular(factor, x[rows], lower=True, check_finite=False)
+        return out
+
+    def deviations(self) -> np.ndarray:
+        """(statistic,) standard deviations."""
+        out = np.empty(len(self.cells))
+        for rows, factor in self._blocks:
+            out[rows] = np.sqrt((factor**2).sum(1))
+        return out
+
+    # ---- derivatives
+    def predict(self, points: np.ndarray) -> np.ndarray:
+        """(point, parameter) -> (point, statistic)."""
+        return self.twin.predict(np.atleast_2d(points), self.part)
+
+    def nuisance_jacobian(self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int]) -> np.ndarray:
+        """(statistic, free) forward differences; parameters of disjoint recordings are moved together."""
+        batches: list[list[int]] = []
+        for m in free:
+            own = set(self.parameters[m].recordings or self.part)
+            for batch in batches:
+                if all(own.isdisjoint(self.parameters[o].recordings or self.part) for o in batch):
+                    batch.append(m)
+                    break
+            else:
+                batches.append([m])
+        points, steps = [], {}
+        for batch in batches:
+            point = values.copy()
+            for m in batch:
+                step = self.parameters[m].step
+                if point[m] + step > self.high[m]:
+                    step = -step
+                point[m] += step
+                steps[m] = step
+            points.append(point)
+        differences = self.predict(np.array(points)) - prediction
+        out = np.zeros((len(self.cells), len(free)))
+        column = {m: c for c, m in enumerate(free)}
+        for batch, difference in zip(batches, differences, strict=True):
+            for m in batch:
+                recordings = self.parameters[m].recordings
+                for name in self.part if recordings is None else recordings:
+                    if name in self.rows:
+                        rows = self.rows[name]
+                        out[rows, column[m]] = difference[rows] / steps[m]
+        return out
+
+    # ---- fits
+    def prior(self, free: Sequence[int], widened: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """Means and standard deviations of the free parameters; widened ones spread over their bounds."""
+        mean, sd = self.mean[list(free)].copy(), self.sd[list(free)].copy()
+        for c, m in enumerate(free):
+            if m in widened:
+                sd[c] = (self.high[m] - self.low[m]) / np.sqrt(12.0)
+        return mean, sd
+
+    def solve(
+        self,
+        values: np.ndarray,
+        prediction: np.ndarray,
+        jacobian: np.ndarray,
+        free: Sequence[int],
+        widened: Sequence[int] = (),
+    ) -> np.ndarray:
+        """One Gauss-Newton step within the bounds; ``jacobian`` (statistic, free) is whitened. Returns new values."""
+        free = list(free)
+        residual = self.whiten(self.observed - prediction)
+        mean, sd = self.prior(free, widened)
+        at = values[free]
+        held = np.zeros(len(free), bool)
+        target = at.copy()
+        for _ in range(6):
+            open_ = ~held
+            shift = np.where(held, target - at, 0.0)
+            r = residual - jacobian @ shift
+            J = jacobian[:, open_]
+            H = J.T @ J + np.diag(1.0 / sd[open_] ** 2)
+            g = J.T @ r + (mean[open_] - at[open_]) / sd[open_] ** 2
+            target = at + shift
+            scale = 1.0 / np.sqrt(np.diag(H))
+            target[open_] = at[open_] + scale * np.linalg.solve(H * np.outer(scale, scale), scale * g)
+            low, high = self.low[free], self.high[free]
+            outside = open_ & ((target < low) | (target > high))
+            if not outside.any():
+                break
+            target = np.clip(target, low, high)
+            held |= outside
+        out = values.copy()
+        out[free] = np.clip(target, self.low[free], self.high[free])
+        return out
+
+    def point(
+        self,
+        values: np.ndarray,
+        prediction: np.ndarray,
+        jacobian: np.ndarray,
+        free: Sequence[int],
+        widened: Sequence[int] = (),
+    ) -> Point:
+        """Objective and Laplace evidence of a parameter point."""
+        free = list(free)
+        mean, sd = self.prior(free, widened)
+        residual = self.whiten(self.observed - prediction)
+        misfit = float(residual @ residual)
+        objective = misfit + float((((values[free] - mean) / sd) ** 2).sum())
+        scaled = jacobian * sd
+        information = np.eye(len(free)) + scaled.T @ scaled
+        _, logdet = np.linalg.slogdet(information)
+        covariance = np.outer(sd, sd) * np.linalg.inv(information)
+        evidence = -0.5 * objective - 0.5 * float(logdet)
+        return Point(values, prediction, objective, misfit, evidence, tuple(free), jacobian, covariance)
+
+    def fit_null(self, iterations: int = 3) -> Point:
+        """Fit of the nuisances alone; calls the twin's ``settle`` (noise, start angle) where it has one."""
+        values = np.array([p.off if p.effect else p.mean for p in self.parameters])
+        settle = getattr(self.twin, "settle", None)
+        for round_ in range(2):
+            if settle is not None:
+                settle(values, self.part)
+            self.set_covariance(values)
+            prediction = self.predict(values)[0]
+            jacobian = self.whiten(self.nuisance_jacobian(values, prediction, self.nuisances))
+            best = self.point(values, prediction, jacobian, self.nuisances)
+            for _ in range(iterations):
+                moved = self.solve(best.values, best.prediction, jacobian, self.nuisances)
+                trial = self.point(moved, self.predict(moved)[0], jacobian, self.nuisances)
+                if trial.objective > best.objective - 0.05:
+                    if trial.objective < best.objective:
+                        best = trial
+                    break
+                best = trial
+            shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
+            values = best.values
+            if round_ == 0 and shifted.max() < 0.05:
+                break
+        return best
+
+    # ---- effects
+    def effect_parameters(self, hypothesis: Hypothesis) -> list[int]:
+        """Indices of the hypothesis' parameters."""
+        return [self.names[n] for n in hypothesis.parameters]
+
+    def screen(self, null: Point, hypotheses: Sequence[Hypothesis]) -> list[Candidate]:
+        """Linearised fit of every hypothesis at every start, from signatures simulated at the null fit."""
+        points, plan = [], []
+        for h in hypotheses:
+            own = self.effect_parameters(h)
+            for start in h.starts:
+                full = null.values.copy()
+                full[own] = start
+                first = len(points)
+                points.append(full)
+                partial = []
+                for c, m in enumerate(own):
+                    if start[c] == self.parameters[m].off or len(own) == 1:
+                        continue
+                    without = full.copy()
+                    without[m] = self.parameters[m].off
+                    partial.append((c, len(points)))
+                    points.append(without)
+                plan.append((h, own, np.array(start), first, partial))
+        predictions = self.predict(np.array(points)) if points else np.zeros((0, len(self.cells)))
+        out = []
+        for h in hypotheses:
+            if h.kind == "calibration":
+                own = self.effect_parameters(h)
+                free = list(self.nuisances)
+                values = self.solve(null.values, null.prediction, null.jacobian, free, own)
+                moved = null.prediction + self.unwhiten(null.jacobian @ (values - null.values)[free])
+                fitted = self.point(values, moved, null.jacobian, free, own)
+                gain = fitted.log_evidence - null.log_evidence
+                columns = null.jacobian[:, [free.index(m) for m in own]]
+                out.append(Candidate((h.effect,), fitted, gain, False, null.values, columns))
+        for h, own, start, first, partial in plan:
+            full = predictions[first]
+            columns = np.zeros((len(self.cells), len(own)))
+            off = np.array([self.parameters[m].off for m in own])
+            if len(own) == 1:
+                columns[:, 0] = (full - null.prediction) / (start[0] - off[0])
+            for c, at in partial:
+                columns[:, c] = (full - predictions[at]) / (start[c] - off[c])
+            signature = self.whiten(columns)
+            begin = null.values.copy()
+            begin[own] = start
+            out.append(self.linear(null, (h,), begin, full, signature))
+        return out
+
+    def unwhiten(self, x: np.ndarray) -> np.ndarray:
+        """C^1/2 x."""
+        out = np.empty_like(x, dtype=float)
+        for rows, factor in self._blocks:
+            out[rows] = factor @ x[rows]
+        return out
+
+    def linear(
+        self, null: Point, hypotheses: Sequence[Hypothesis], begin: np.ndarray, prediction: np.ndarray, signature
+    ) -> Candidate:
+        """Fit of nuisances and effects linearised about ``begin``; the null's nuisance derivatives are kept."""
+        own = [m for h in hypotheses for m in self.effect_parameters(h) if h.kind != "calibration"]
+        widened = [m for h in hypotheses for m in self.effect_parameters(h) if h.kind == "calibration"]
+        free = [*self.nuisances, *own]
+        jacobian = np.concatenate([null.jacobian, signature], axis=1)
+        values = self.solve(begin, prediction, jacobian, free, widened)
+        moved = prediction + self.unwhiten(jacobian @ (values - begin)[free])
+        fitted = self.point(values, moved, jacobian, free, widened)
+        effects = tuple(h.effect for h in hypotheses)
+        return Candidate(effects, fitted, fitted.log_evidence - null.log_evidence, False, begin, signature)
+
+    def refine(
+        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int = 2, renew: bool = True
+    ) -> Candidate:
+        """Refit a candidate with the simulator: true prediction, effect derivatives renewed once at the solution."""
+        chosen = [hypotheses[e] for e in candidate.effects]
+        own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
+        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        free = [*self.nuisances, *own]
+        jacobian = candidate.point.jacobian
+        values = candidate.point.values
+        best = self.point(values, self.predict(values)[0], jacobian, free, widened)
+        for round_ in range(rounds):
+            if own and renew and round_ == 0:
+                jacobian = jacobian.copy()
+                steps, points = [], []
+                for m in own:
+                    step = self.parameters[m].step
+                    if best.values[m] + step > self.high[m]:
+                        step = -step
+                    point = best.values.copy()
+                    point[m] += step
+                    steps.append(step)
+                    points.append(point)
+                differences = (self.predict(np.array(points)) - best.prediction).T / np.array(steps)
+                jacobian[:, len(self.nuisances) :] = self.whiten(differences)
+                best = self.point(best.values, best.prediction, jacobian, free, widened)
+            moved = self.solve(best.values, best.prediction, jacobian, free, widened)
+            trial = self.point(moved, self.predict(moved)[0], jacobian, free, widened)
+            if trial.objective > best.objective:
+                halfway = 0.5 * (best.values + moved)
+                trial = self.point(halfway, self.predict(halfway)[0], jacobian, free, widened)
+            done = trial.objective > best.objective - 0.2
+            if trial.objective < best.objective:
+                best = trial
+            if done:
+                break
+        signature = jacobian[:, len(self.nuisances) :] if own else candidate.signature
+        return replace(
+            candidate, point=best, gain=best.log_evidence - null.log_evidence, refined=True, signature=signature
+        )
+
+    def projected(self, null: Point, columns: np.ndarray) -> np.ndarray:
+        """Whitened columns with the nuisances marginalised: (I + J S J')^-1/2 in the sense of inner products."""
+        _, sd = self.prior(self.nuisances)
+        J = null.jacobian * sd
+        inner = np.eye(J.shape[1]) + J.T @ J
+        return columns - J @ np.linalg.solve(inner, J.T @ columns)
+
+    def squared_distance(self, null: Point, difference: np.ndarray) -> float:
+        """d' (C + J S J')^-1 d of a whitened difference of predictions."""
+        return float(difference @ self.projected(null, difference[:, None])[:, 0])
+
+
+def effect_index(parameters: Sequence[Parameter], effect: str) -> list[int]:
+    """Indices of an effect's own parameters."""
+    return [m for m, p in enumerate(parameters) if p.effect == effect]

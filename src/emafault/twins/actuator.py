@@ -1,0 +1,385 @@
+"""The reference actuator as the diagnosis sees it: statistics by simulation with the actuator's own compiled model."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..actuator.commands import resample
+from ..actuator.kernel import run_actuator
+from ..actuator.parameters import ActuatorParameters, make_runs
+from ..actuator.sensors import SensorNoise
+from ..effects import EFFECTS
+from ..faults import FAULT_NAMES
+from ..gap.twin import Cell, Hypothesis, Parameter
+from ..recording import Recording
+from .actuator_noise import CHANNELS, channel_spread, noise_covariance
+from .actuator_statistics import LATTICE, SIZE, Computed, Nominal, cells_of, compute
+
+HEALTHY_DEVIATION = 5e-4  # of N and xi in a recording called healthy (the format allows 1e-3)
+SOAK_DEVIATION = 0.5  # K, of the true ambient temperature about the measured
+MINIMUM_COUNT = 15  # samples behind a statistic that is used
+NOISE_REPEATS = 12
+JITTER_REPEATS = 6
+START_SCATTER = 2e-3  # rad, over which commutations fall differently between the recording instants
+BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
+_TOLERANCES = {
+    (effect.id, name): parameter
+    for effect in EFFECTS.values()
+    for name, parameter in effect.parameters.items()
+    if parameter.tolerance > 0.0
+}
+#: starts of a fit where half the range in every parameter would not do
+_STARTS: dict[str, tuple[tuple[float, ...], ...]] = {
+    "stribeck": ((0.01, 4.0), (0.01, 12.0)),
+    "compliance": ((2.5e-4, 300.0), (8e-5, 300.0)),
+    "dynamic_eccentricity": ((0.01, 0.01),),
+    "back_emf_shape": ((112.0, 0.01, 0.01),),
+    "self_heating": ((0.1,),),
+    "speed_quantisation": ((1.0,),),
+    "virtual_neutral": ((1.0,),),
+}
+#: parameters in which an effect is fitted where the catalogue's own are ill-behaved at zero: name -> (units, low, high)
+_OWN: dict[str, dict[str, tuple[str, float, float]]] = {
+    "dynamic_eccentricity": {"d_cos": ("1", -0.06, 0.06), "d_sin": ("1", -0.06, 0.06)},
+    "compliance": {"flexibility": ("rad/(N m)", 0.0, 8e-4), "C": ("N m s/rad", 150.0, 500.0)},
+    "self_heating": {"heating_rate": ("K/J", 0.0, 0.5)},
+}
+
+
+@dataclass
+class _Brought:
+    """One recording as brought, with what depends on it alone."""
+
+    recording: Recording
+    signals: dict
+    nominal: Nominal
+    command: np.ndarray
+    computed: Computed
+    usable: np.ndarray  # (statistic,) bool
+    noise: dict[str, float]
+    theta_0: float
+
+
+class ActuatorTwin:
+    """Twin of the reference actuator for a bench of recordings.
+
+    Parameters
+    ----------
+    actuator : nominal parameters
+    recordings : by name
+    noise : noise of the sensors where a recording does not tell it
+    exclude : effects left out of the library
+    threads : simulations run side by side
+    """
+
+    name = "actuator"
+
+    def __init__(
+        self,
+        actuator: ActuatorParameters,
+        recordings: Mapping[str, Recording],
+        noise: SensorNoise,
+        exclude: Sequence[str] = (),
+        threads: int = 2,
+    ):
+        self.actuator = actuator
+        self.threads = threads
+        self.sensor_noise = noise
+        self._brought = {name: self._bring(recording) for name, recording in recordings.items()}
+        self.effects = {id: e for id, e in EFFECTS.items() if id not in exclude}
+        self.parameters = self._parameters()
+        self.index = {p.name: m for m, p in enumerate(self.parameters)}
+        self.hypotheses = self._hypotheses()
+        self._offset: dict[str, np.ndarray] = {}
+        self._cache: dict[tuple[str, bytes], np.ndarray] = {}
+
+    # ---- the recordings
+    def _bring(self, recording: Recording) -> _Brought:
+        names = ["phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle"]
+        names += ["output_position", "commanded_position", "bus_voltage"]
+        signals = {n: np.ascontiguousarray(getattr(recording, n)) for n in names if getattr(recording, n) is not None}
+        rest = np.flatnonzero(np.abs(signals["rotor_angle"] - signals["rotor_angle"][0]) > 2e-3)
+        still = max(1, int(rest[0]) if len(rest) else len(signals["rotor_angle"]))
+        theta_0 = float(np.mean(signals["rotor_angle"][: max(1, still - 1)]))
+        nominal = Nominal.of(self.actuator, recording, theta_0)
+        duration = recording.interval * len(recording.time)
+        start = recording.time[0] - recording.interval
+        command = resample(recording.time - start, recording.commanded_position, duration, self.actuator.control_period)
+        computed = compute(nominal, signals, keep=True)
+        usable = computed.count >= MINIMUM_COUNT
+        return _Brought(recording, signals, nominal, command, computed, usable, {}, theta_0)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the recordings."""
+        return list(self._brought)
+
+    def duration(self, name: str) -> float:
+        """Length of a recording (s)."""
+        b = self._brought[name]
+        return b.nominal.interval * len(b.recording.time)
+
+    # ---- parameters and hypotheses
+    def _parameters(self) -> list[Parameter]:
+        out = []
+        for (effect, name), p in _TOLERANCES.items():
+            centre = getattr(self.actuator, p.follows) if p.follows else p.nominal
+            sd = p.tolerance * centre
+            low, high = min(p.low, centre - 6 * sd), max(p.high, centre + 6 * sd)
+            out.append(Parameter(f"{effect}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd))
+        groups: dict[str, list[str]] = {}
+        for name, b in self._brought.items():
+            key = f"seeded {name}" if b.recording.health == "seeded" else b.recording.health
+            groups.setdefault(key, []).append(name)
+        for key, members in groups.items():
+            healthy = key == "healthy"
+            for component in FAULT_NAMES[:5]:
+                turns = component.startswith("N")
+                mean, sd = (0.0, HEALTHY_DEVIATION) if healthy else ((0.03, 0.05) if turns else (0.0, 0.1))
+                bound = 2e-3 if healthy else (0.3 if turns else 0.4)
+                low = -bound if not turns or healthy else -0.002
+                out.append(
+                    Parameter(
+                        f"{key}.{component}", "1", 0.0, mean, sd, low, bound, 0.01, None, tuple(members), component
+                    )
+                )
+        for name, b in self._brought.items():
+            dT = b.recording.ambient_temperature - self.actuator.reference_temperature
+            out.append(Parameter(f"{name}.dT", "K", dT, dT, SOAK_DEVIATION, dT - 5, dT + 5, 3.0, None, (name,), "dT"))
+        for effect in self.effects.values():
+            if effect.kind == "calibration":
+                continue
+            if effect.id in _OWN:
+                for name, (units, low, high) in _OWN[effect.id].items():
+                    sd = 0.5 * max(abs(low), abs(high))
+                    off = 300.0 if name == "C" else 0.0
+                    mean = 300.0 if name == "C" else 0.0
+                    sd = 100.0 if name == "C" else sd
+                    step = 0.1 * (high - low)
+                    out.append(Parameter(f"{effect.id}.{name}", units, off, mean, sd, low, high, step, effect.id))
+                continue
+            for name, p in effect.parameters.items():
+                width = max(abs(p.high - p.nominal), abs(p.low - p.nominal))
+                low = p.nominal - 1.5 * width if p.low < p.nominal else p.nominal
+                high = p.nominal + 1.5 * width if p.high > p.nominal else p.nominal
+                if effect.id == "stribeck" and name == "w_s":
+                    low, high = 0.7, 40.0
+                if name == "width":
+                    low = 75.0
+                out.append(
+                    Parameter(
+                        f"{effect.id}.{name}",
+                        p.units,
+                        p.nominal,
+                        p.nominal,
+                        0.6 * width,
+                        low,
+                        high,
+                        0.2 * width,
+                        effect.id,
+                    )
+                )
+        return out
+
+    def _hypotheses(self) -> list[Hypothesis]:
+        out = []
+        for effect in self.effects.values():
+            own = [p for p in self.parameters if p.effect == effect.id]
+            if effect.kind == "calibration":
+                names = tuple(f"{effect.id}.{n}" for n in effect.parameters)
+                out.append(Hypothesis(effect.id, effect.equations, names, (), "calibration"))
+                continue
+            starts = _STARTS.get(effect.id)
+            if effect.id == "speed_quantisation":
+                seen = [b.computed.values[LATTICE] for b in self._brought.values()]
+                starts = ((float(np.median(seen)) if max(seen) > 0 else 1.0,),)
+            if starts is None:
+                starts = (tuple(p.off + (0.25 * p.sd if p.high > p.off else -0.25 * p.sd) / 0.6 for p in own),)
+            out.append(Hypothesis(effect.id, effect.equations, tuple(p.name for p in own), starts))
+        return out
+
+    # ---- statistics
+    def cells(self, part: Sequence[str]) -> list[Cell]:
+        """Cells of the usable statistics, recording by recording."""
+        return [c for name in part for c, u in zip(cells_of(name), self._brought[name].usable, strict=True) if u]
+
+    def observed(self, part: Sequence[str]) -> np.ndarray:
+        """(statistic,) statistics of the recordings."""
+        return np.concatenate([self._brought[n].computed.values[self._brought[n].usable] for n in part])
+
+    def predict(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
+        """(point, parameter) -> (point, statistic), by simulation; a point already simulated is remembered."""
+        values = np.atleast_2d(values)
+        runs = {name: self._runs(values, name) for name in part}
+        tasks, seen = [], {}
+        for name in part:
+            for row in range(len(values)):
+                key = (name, runs[name][row].tobytes())
+                if key not in self._cache and key not in seen:
+                    seen[key] = (name, runs[name][row])
+                tasks.append(key)
+        new = list(seen.items())
+
+        def work(item):
+            key, (name, run) = item
+            return key, self._statistics_of(name, run).values
+
+        if self.threads > 1 and len(new) > 1:
+            with ThreadPoolExecutor(self.threads) as pool:
+                done = list(pool.map(work, new))
+        else:
+            done = [work(item) for item in new]
+        self._cache.update(done)
+        out = []
+        rows = len(values)
+        for m, name in enumerate(part):
+            b = self._brought[name]
+            block = np.array([self._cache[tasks[m * rows + row]] for row in range(rows)])
+            out.append((block + self._offset.get(name, 0.0))[:, b.usable])
+        return np.concatenate(out, axis=1)
+
+    def _runs(self, values: np.ndarray, name: str) -> np.ndarray:
+        """Records of one recording at every parameter point."""
+        b = self._brought[name]
+        faults = np.zeros((len(values), 6))
+        effects: dict[str, dict[str, np.ndarray]] = {}
+        for m, p in enumerate(self.parameters):
+            if p.fault is not None:
+                if name in (p.recordings or ()):
+                    faults[:, FAULT_NAMES.index(p.fault)] = values[:, m]
+                continue
+            effect, parameter = p.name.split(".", 1)
+            effects.setdefault(effect, {})[parameter] = values[:, m]
+        if "dynamic_eccentricity" in effects:
+            x, y = (effects["dynamic_eccentricity"].pop(n) for n in ("d_cos", "d_sin"))
+            effects["dynamic_eccentricity"] = {"d": np.hypot(x, y), "psi": np.arctan2(y, x)}
+        if "compliance" in effects:
+            flexibility = effects["compliance"].pop("flexibility")
+            stiff = flexibility < 1e-6
+            effects["compliance"]["K"] = np.where(stiff, 0.0, 1.0 / np.where(stiff, 1.0, flexibility))
+        offset = effects.get("angle_offset", {}).get("offset", np.zeros(len(values)))
+        theta_0 = b.theta_0 - np.deg2rad(offset) / self.actuator.pole_pairs
+        return make_runs(self.actuator, faults, effects=effects, theta_0=theta_0)
+
+    def _simulate(self, name: str, run: np.void) -> dict:
+        b = self._brought[name]
+        n = len(b.recording.time)
+        arrays = [np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), *(np.empty(n) for _ in range(4))]
+        run_actuator(run, b.command, b.nominal.interval, *arrays)
+        keys = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle")
+        out = dict(zip((*keys, "output_position", "bus_voltage"), arrays, strict=True))
+        out["commanded_position"] = b.signals["commanded_position"]
+        return out
+
+    def _statistics_of(self, name: str, run: np.void, keep: bool = False) -> Computed:
+        signals = self._simulate(name, run)
+        step = float(run["speed_quantisation_step"])
+        if step > 0.0:
+            sigma = self._brought[name].noise.get("speed", 0.0)
+            rng = np.random.default_rng(0)
+            noisy = signals["rotor_speed"] + sigma * rng.standard_normal(len(signals["rotor_speed"]))
+            signals["rotor_speed"] = step * np.round(noisy / step)
+        return compute(self._brought[name].nominal, signals, keep)
+
+    # ---- noise
+    def settle(self, values: np.ndarray, part: Sequence[str]) -> None:
+        """Take start angle, noise and the noise's bias of the statistics from a comparison with one simulated point."""
+        runs = {name: self._runs(values[None, :], name)[0] for name in part}
+
+        def work(name: str) -> None:
+            b, run = self._brought[name], runs[name]
+            clean = self._simulate(name, run)
+            first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
+            drift = float(np.median((b.signals["rotor_angle"] - clean["rotor_angle"])[:first]))
+            if abs(drift) < 0.2:
+                b.theta_0 += drift
+            own, model = channel_spread(b.signals, b.nominal), channel_spread(clean, b.nominal)
+            fallback = {c: getattr(self.sensor_noise, c) for c in CHANNELS}
+            for channel in CHANNELS:
+                floor = 0.02 * fallback[channel]
+                spread = own.get(channel)
+                value = fallback[channel] if spread is None else spread
+                if spread is not None:
+                    value = np.sqrt(max(spread**2 - model.get(channel, 0.0) ** 2, floor**2))
+                b.noise[channel] = float(value)
+            rng = np.random.default_rng(1)
+            still = compute(b.nominal, clean).values
+            total = np.zeros(SIZE)
+            pairs = (("phase_voltage", "voltage"), ("phase_current", "current"), ("phase_current_end", "current_end"))
+            pairs += (("rotor_speed", "speed"), ("rotor_angle", "angle"), ("output_position", "position"))
+            pairs += (("bus_voltage", "bus_voltage"),)
+            for _ in range(NOISE_REPEATS):
+                noisy = dict(clean)
+                for signal, channel in pairs:
+                    noisy[signal] = clean[signal] + b.noise[channel] * rng.standard_normal(clean[signal].shape)
+                total += compute(b.nominal, noisy).values
+            self._offset[name] = total / NOISE_REPEATS - still
+            self._offset[name][LATTICE] = 0.0
+
+        with ThreadPoolExecutor(self.threads) as pool:
+            list(pool.map(work, part))
+        self._cache.clear()
+
+    def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
+        """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
+        blocks = []
+        rng = np.random.default_rng(2)
+        shifts = {name: START_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
+
+        def work(name: str) -> np.ndarray:
+            b = self._brought[name]
+            run = self._runs(values[None, :], name)[0]
+            repeats = []
+            for shift in shifts[name]:
+                moved = run.copy()
+                moved["theta_0"] += shift
+                repeats.append(self._statistics_of(name, moved).values)
+            jitter = np.var(repeats, axis=0, ddof=1) * 1.4
+            cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
+            cov *= 1.0 + 1.0 / NOISE_REPEATS
+            # the recording scatters once and the single simulation it is compared with once more
+            extra = 2.0 * jitter + (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
+            cov[np.diag_indices(SIZE)] += extra + 1e-18
+            return cov[np.ix_(b.usable, b.usable)]
+
+        with ThreadPoolExecutor(self.threads) as pool:
+            blocks = list(pool.map(work, part))
+        size = sum(len(block) for block in blocks)
+        out = np.zeros((size, size))
+        at = 0
+        for block in blocks:
+            out[at : at + len(block), at : at + len(block)] = block
+            at += len(block)
+        return out
+
+    # ---- what the verdict says
+    def report(
+        self, effect: str, values: Mapping[str, float], deviations: Mapping[str, float]
+    ) -> dict[str, tuple[float, float, float, str]]:
+        """Catalogue parameters of an effect from those it was fitted in: name -> (value, low, high, units), 90 %."""
+        z = 1.645
+        out: dict[str, tuple[float, float, float, str]] = {}
+        own = {n.split(".", 1)[1]: (v, deviations[n]) for n, v in values.items()}
+        if effect == "dynamic_eccentricity":
+            (x, sx), (y, sy) = own["d_cos"], own["d_sin"]
+            d = float(np.hypot(x, y))
+            sd = float(np.hypot(x * sx, y * sy) / max(d, 1e-9))
+            turn = float(np.hypot(y * sx, x * sy) / max(d, 1e-9) ** 2)
+            psi = float(np.arctan2(y, x))
+            out["d"] = (d, max(0.0, d - z * sd), d + z * sd, "1")
+            out["psi"] = (psi, psi - z * min(turn, np.pi), psi + z * min(turn, np.pi), "rad")
+            return out
+        for name, (value, sd) in own.items():
+            if name == "flexibility":
+                low = max(value - z * sd, 1e-6)
+                out["K"] = (1.0 / max(value, 1e-6), 1.0 / (value + z * sd), 1.0 / low, "N m/rad")
+                continue
+            units = self.parameters[self.index[f"{effect}.{name}"]].units
+            out[name] = (value, value - z * sd, value + z * sd, units)
+            if name == "heating_rate":
+                low = max(value - z * sd, 1e-4)
+                out["C"] = (1.0 / max(value, 1e-4), 1.0 / (value + z * sd), 1.0 / low, "J/K")
+        return out
+
