@@ -96,6 +96,17 @@ def test_another_storage_is_a_setting(data, tmp_path):
         search.open_study("nonsense://there", "name")
 
 
+@pytest.mark.parametrize("content", ["notes\n", "notes", '{"a": 1}\n'])
+def test_a_file_that_is_no_journal_is_refused_and_kept(data, tmp_path, content):
+    path = tmp_path / "notes.txt"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"notes\.txt: not a search journal"):
+        search.run_worker(path, settings(2), *data)
+    assert path.read_text() == content
+    with pytest.raises(InputError, match="cannot be stored"):
+        search.open_study(tmp_path, "name")
+
+
 def trial(number, error, parameters):
     return search.Trial(number, error, parameters, {}, {}, 1.0)
 

@@ -24,6 +24,7 @@ from .training import train
 
 #: a trial of another host counts as abandoned after this long (s); on this host its process is asked for
 ABANDONED_AFTER = 600.0
+_JOURNAL_HEAD = b'{"op_code":'
 SAMPLERS = ("tpe", "nsga2")
 #: proposals of settings already tried that are refused in a row before one is taken, as it must be in a small space
 _REPEATS = 20
@@ -163,6 +164,9 @@ def _mend(path: Path, lock) -> None:
     if not path.exists() or path.stat().st_size == 0:
         return
     with open(path, "r+b") as file:
+        head = file.read(len(_JOURNAL_HEAD))
+        if head != _JOURNAL_HEAD[: len(head)]:
+            raise InputError(f"{path}: not a search journal; name another file or remove this one")
         file.seek(-1, os.SEEK_END)
         if file.read(1) == b"\n":
             return
