@@ -2,7 +2,8 @@
 
 Base model, theta the electrical angle of the first channel's fundamental, one k for all phases, sine shape:
     v_c = k w sin(theta - c 120 deg s),  s the phase sequence
-The statistics are the harmonics of each channel over the electrical turn (order 0 is the offset).
+The statistics are, per channel, the logarithm of the fundamental's amplitude, its angle, and the harmonics over the
+electrical turn in parts of the channel's own fundamental (order 0 is the offset): a gain moves one of them only.
 """
 
 import re
@@ -13,13 +14,14 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     nuisance,
     read_arrays,
     require_finite,
@@ -27,7 +29,7 @@ from emafault.twins.measured import (
 
 NAME = "back_emf"
 ORDERS = 13  # highest harmonic
-ACCURACY = 0.003  # of the first channel's fundamental: vertical resolution and linearity of the scope
+ACCURACY = 0.003  # of a channel's fundamental: vertical resolution and linearity of the scope
 POLE_PAIRS = 7  # where the name of a recording gives no speed from which to find them
 SHAPE = (2, 3, 5, 7, 11, 13)  # harmonics that the shape of the magnet's field may have
 
@@ -119,17 +121,25 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
         for n, rpm in named.items() if abs(60 * f[n] / pairs / rpm - 1) > 0.02
     ]  # fmt: skip
     notes.append("a small difference of a channel's gain and of a phase's k look alike at open circuit")
+    parameters = _parameters(scale)
     return MeasuredTwin(
         NAME,
         case,
         tuple(explore),
         tuple(confirm),
         blocks,
-        _parameters(scale),
-        _hypotheses(),
+        parameters,
+        library(parameters, _equations(), PROBE_STARTS),
         _model,
         notes=tuple(notes),
     )
+
+
+def relative(c: np.ndarray) -> np.ndarray:
+    """(order, phase) harmonics in parts of each channel's fundamental; order 1 holds log amplitude + i angle."""
+    out = c / np.abs(c[1])
+    out[1] = np.log(np.abs(c[1])) + 1j * np.angle(c[1] / c[1, 0])
+    return out
 
 
 def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, sequence: float) -> Block:
@@ -138,20 +148,25 @@ def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, seq
     periods = int(f * (t[-1] - t[0]))
     parts = min(8, max(2, periods // 2))
     length = int(periods / parts / f / ((t[-1] - t[0]) / (t.size - 1)))
-    pieces = np.stack([harmonics(t[s], v[s], f) for s in (slice(k * length, (k + 1) * length) for k in range(parts))])
-    scatter = pieces.real.var(axis=0, ddof=1) / parts, pieces.imag.var(axis=0, ddof=1) / parts
-    size = np.abs(c[1])[None, :]
+    stretches = [slice(k * length, (k + 1) * length) for k in range(parts)]
+    pieces = np.stack([relative(harmonics(t[s], v[s], f)) for s in stretches])
+    values = relative(c)
+    ideal = np.exp(-2j * np.pi / 3 * sequence * np.arange(3))
+    # angles are counted from where the sequence puts each phase, so that none is near half a turn
+    values[1].imag = np.angle(np.exp(1j * values[1].imag) / ideal)
+    pieces[:, 1].imag = np.angle(np.exp(1j * pieces[:, 1].imag) / ideal)
     cells, observed, variance, order, phase, part = [], [], [], [], [], []
     for channel in range(3):
         for n in range(ORDERS + 1):
-            for k, values in enumerate((c.real, c.imag)):
-                if (n == 0 and k == 1) or (n == 1 and channel == 0 and k == 0):
-                    continue  # no imaginary offset; the first channel's phase defines the angle
+            for k, name_of in enumerate(("log amplitude", "angle") if n == 1 else ("cos", "sin")):
+                if (n == 0 and k == 1) or (n == 1 and channel == 0 and k == 1):
+                    continue  # no imaginary offset; the first channel defines the angle
                 equation = "sensor_voltage" if n == 0 else f"electrical_{'abc'[channel]}"
-                cells.append(Cell(name, equation, "order", n, n, f"channel {channel + 1}, {('cos', 'sin')[k]}"))
-                observed.append(values[n, channel])
-                # an instrument's error is in proportion to what its own channel shows
-                variance.append(scatter[k][n, channel] + (ACCURACY * size[0, channel]) ** 2)
+                cells.append(Cell(name, equation, "order", n, n, f"channel {channel + 1}, {name_of}"))
+                number = (values[n, channel].real, values[n, channel].imag)[k]
+                scatter = (pieces[:, n, channel].real, pieces[:, n, channel].imag)[k]
+                observed.append(number)
+                variance.append(scatter.var(ddof=1) / parts + ACCURACY**2)
                 order.append(n)
                 phase.append(channel)
                 part.append(k)
@@ -160,8 +175,8 @@ def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, seq
     return Block(cells, np.array(observed), np.diag(variance), inputs)
 
 
-def _parameters(scale: float):
-    found = [nuisance("k", "V s/rad", scale, 0.3 * scale, low=0.0)]
+def _parameters(scale: float) -> tuple[Parameter, ...]:
+    found = [nuisance("log_k", "log(V s/rad)", float(np.log(scale)), 0.5)]
     for c in "abc":
         found.append(freedom(f"channel_gain_{c}", f"decades_{c}", "1", 0.7, -2.5, 2.5))
     found += [freedom("phase_gain", f"k_{c}", "1", 0.02, -0.3, 0.3) for c in "bc"]
@@ -173,49 +188,41 @@ def _parameters(scale: float):
     return tuple(found)
 
 
-def _hypotheses():
+def _equations() -> dict[str, tuple[str, ...]]:
     electrical = ("electrical_a", "electrical_b", "electrical_c")
-    # a wrong probe setting is a power of ten, so a fit starts there too
-    starts = ((0.0,), (-1.0,), (1.0,))
-    return (
-        *(
-            Hypothesis(f"channel_gain_{c}", (f"electrical_{c}",), (f"decades_{c}",), starts, kind="calibration")
-            for c in "abc"
-        ),
-        Hypothesis("phase_gain", electrical[1:], ("k_b", "k_c"), ((0.0, 0.0),)),
-        Hypothesis("phase_angle", electrical[1:], ("angle_b", "angle_c"), ((0.0, 0.0),)),
-        Hypothesis(
-            "channel_offset",
-            ("sensor_voltage",),
-            ("offset_a", "offset_b", "offset_c"),
-            ((0.0, 0.0, 0.0),),
-            kind="calibration",
-        ),
-        *(Hypothesis(f"shape_{n}", electrical, (f"cos_{n}", f"sin_{n}"), ((0.0, 0.0),)) for n in SHAPE),
-        Hypothesis("flux_loss", electrical, ("droop",), ((0.0,),)),
-    )
+    found: dict[str, tuple[str, ...]] = {f"channel_gain_{c}": (f"electrical_{c}",) for c in "abc"}
+    found |= {"phase_gain": electrical[1:], "phase_angle": electrical[1:], "channel_offset": ("sensor_voltage",)}
+    return found | {f"shape_{n}": electrical for n in SHAPE} | {"flux_loss": electrical}
+
+
+# a wrong probe setting is a power of ten, so fits start there
+PROBE_STARTS = {f"channel_gain_{c}": ((0.1,), (-1.0,), (1.0,)) for c in "abc"}
 
 
 def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     """(point, statistic): real or imaginary part of each harmonic of each channel."""
     x = block.inputs
-    order, phase = x["order"], x["phase"]
-    amplitude = p["k"] * x["w"] * (1 - p["droop"] * x["w"])
-    one = np.ones_like(amplitude)
-    gain = np.zeros_like(amplitude)
-    offset = np.zeros_like(amplitude)
-    angle = np.zeros_like(amplitude)
+    order, phase, part = x["order"], x["phase"], x["part"]
+    amplitude = np.exp(p["log_k"]) * x["w"] * (1 - p["droop"] * x["w"])
+    zero = np.zeros_like(amplitude)
+    log_gain, k, angle, offset = zero, zero + 1, zero, zero
     for number, c in enumerate("abc"):
-        here = phase == number
-        k = 1 + p[f"k_{c}"] if number else one
-        gain = gain + here * 10.0 ** p[f"decades_{c}"] * k
-        offset = offset + here * 10.0 ** p[f"decades_{c}"] * p[f"offset_{c}"]
-        angle = angle + here * ((p[f"angle_{c}"] if number else 0 * one) - number * x["sequence"] * 2 * np.pi / 3)
-    shape = np.where(order == 1, -1j, 0j) + np.zeros_like(amplitude)
+        here = (phase == number).astype(float)
+        log_gain = log_gain + here * np.log(10.0) * p[f"decades_{c}"]
+        offset = offset + here * p[f"offset_{c}"]
+        if number:
+            k = k + here * p[f"k_{c}"]
+            angle = angle + here * p[f"angle_{c}"]
+    # harmonics sit on the same rotor: each phase shows them turned by order times its own angle
+    turned = order * (angle - phase * x["sequence"] * 2 * np.pi / 3)
+    shape = zero + 0j
     for n in SHAPE:
         shape = shape + (order == n) * (p[f"cos_{n}"] - 1j * p[f"sin_{n}"])
-    value = gain * amplitude * shape * np.exp(1j * order * angle)
-    return np.where(order == 0, offset, np.where(x["part"] == 0, value.real, value.imag))
+    shape = shape * np.exp(1j * turned)
+    value = np.where(part == 0, shape.real, shape.imag)
+    value = np.where(order == 0, offset / (k * amplitude), value)
+    first = np.where(part == 0, np.log(k * amplitude) + log_gain, angle)
+    return np.where(order == 1, first, value)
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     mean_variance,
     nuisance,
     read_columns,
@@ -77,8 +78,9 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
     explore, confirm = _split(stretches, int(EXPLORE_SHARE * total))
     scale = _scales(arrays, np.concatenate(stretches))
     blocks = {part: _block(part, rows, arrays, scale) for part, rows in (explore | confirm).items()}
+    parameters = _parameters(scale)
     return MeasuredTwin(
-        NAME, case, tuple(explore), tuple(confirm), blocks, _parameters(scale), _hypotheses(), _model,
+        NAME, case, tuple(explore), tuple(confirm), blocks, parameters, library(parameters, _equations()), _model,
         notes=(
             f"{total} steady rows in {len(stretches)} operating condition(s); the first {EXPLORE_SHARE:.0%} explore",
         ),
@@ -136,7 +138,7 @@ def _block(part: str, rows: np.ndarray, arrays: Arrays, scale: Mapping[str, floa
     return Block(cells, np.concatenate(observed), covariance, inputs)
 
 
-def _parameters(scale: Mapping[str, float]):
+def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
     impedance = scale["voltage"] / scale["current"]
     inductance, flux = impedance / scale["omega"], scale["voltage"] / scale["omega"]
     inverse, cross = 1 / scale["current"], flux / scale["current"] ** 2
@@ -160,25 +162,27 @@ def _parameters(scale: Mapping[str, float]):
         freedom("torque_gain", "gain_T", "1", 0.05, -0.5, 0.5),
         freedom("current_gain", "gain_i", "1", 0.03, -0.3, 0.3),
         freedom("voltage_drift", "drift", "1", 0.02, -0.2, 0.2),
+        freedom("torque_drift", "drift_T", "1", 0.05, -0.3, 0.3),
     )  # fmt: skip
 
 
-def _hypotheses():
+def _equations() -> dict[str, tuple[str, ...]]:
     d, q, torque = "electrical_d", "electrical_q", "torque"
-    return (
-        Hypothesis("resistance_temperature", (d, q), ("alpha_R",), ((0.0039,),)),
-        Hypothesis("magnet_temperature", (q, torque), ("alpha_m",), ((-0.001,),)),
-        Hypothesis("saturation_d", (q, torque), ("saturation_d",), ((0.0,),)),
-        Hypothesis("saturation_q", (d, torque), ("saturation_q",), ((0.0,),)),
-        Hypothesis("cross_saturation", (d, q), ("cross_saturation",), ((0.0,),)),
-        Hypothesis("iron_loss", (d, q, torque), ("G_iron", "T_iron"), ((0.0, 0.0),)),
-        Hypothesis("voltage_error", (d, q), ("V_drop",), ((0.0,),)),
-        Hypothesis("angle_offset", (d, q), ("delta",), ((0.0,),)),
-        Hypothesis("torque_from_map", (torque,), ("share_map", "gain_map"), ((1.0, 0.0),)),
-        Hypothesis("torque_gain", (torque,), ("gain_T",), ((0.0,),), kind="calibration"),
-        Hypothesis("current_gain", (torque, d, q), ("gain_i",), ((0.0,),), kind="calibration"),
-        Hypothesis("voltage_drift", (d, q), ("drift",), ((0.0,),), kind="calibration"),
-    )
+    return {
+        "resistance_temperature": (d, q),
+        "magnet_temperature": (q, torque),
+        "saturation_d": (q, torque),
+        "saturation_q": (d, torque),
+        "cross_saturation": (d, q),
+        "iron_loss": (d, q, torque),
+        "voltage_error": (d, q),
+        "angle_offset": (d, q),
+        "torque_from_map": (torque,),
+        "torque_gain": (torque,),
+        "current_gain": (torque, d, q),
+        "voltage_drift": (d, q),
+        "torque_drift": (torque,),
+    }
 
 
 def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
@@ -207,7 +211,7 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     growth = 1 + p["drift"] * x["elapsed"]
     # a torque computed from the currents alone does not follow the magnet: psi as at the reference temperature
     flux_torque = flux_d_t + p["share_map"] * (p["psi"] - psi)
-    gain = (1 + p["gain_T"]) * (1 + p["gain_map"])
+    gain = (1 + p["gain_T"]) * (1 + p["gain_map"]) * (1 + p["drift_T"] * x["elapsed"])
     torque = 1.5 * (flux_torque * i_qt - flux_q_t * i_dt) * gain - p["T_iron"] * np.sign(w)
     return np.concatenate([u_d * growth, u_q * growth, torque], axis=1)
 
@@ -215,29 +219,20 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
 def distortions() -> tuple[Distortion, ...]:
     """Known changes of a recording and what rightly names each."""
 
-    def torque_gain(a: Arrays) -> Arrays:
-        return a | {"torque": a["torque"] * 1.1}
-
-    def angle(a: Arrays) -> Arrays:
-        c, s = np.cos(0.05), np.sin(0.05)
-        return a | {
-            "u_d": c * a["u_d"] - s * a["u_q"], "u_q": s * a["u_d"] + c * a["u_q"],
-            "i_d": c * a["i_d"] - s * a["i_q"], "i_q": s * a["i_d"] + c * a["i_q"],
-        }  # fmt: skip
-
-    def drift(a: Arrays) -> Arrays:
+    def voltage_drift(a: Arrays) -> Arrays:
         growth = 1 + 0.05 * np.linspace(0, 1, a["u_d"].size)
         return a | {"u_d": a["u_d"] * growth, "u_q": a["u_q"] * growth}
 
+    def torque_drift(a: Arrays) -> Arrays:
+        return a | {"torque": a["torque"] * (1 + 0.1 * np.linspace(0, 1, a["torque"].size))}
+
     def torque_wave(a: Arrays) -> Arrays:
         time = np.arange(a["torque"].size)
-        return a | {
-            "torque": a["torque"] + 0.05 * np.abs(a["torque"]).max() * np.sin(2 * np.pi * time / (0.15 * time.size))
-        }
+        wave = np.sin(2 * np.pi * time / (0.15 * time.size))
+        return a | {"torque": a["torque"] + 0.05 * np.abs(a["torque"]).max() * wave}
 
     return (
-        Distortion("torque_gain +10 %", torque_gain, ("torque_gain",), "torque"),
-        Distortion("rotor angle +0.05 rad", angle, ("angle_offset",), "electrical_d"),
-        Distortion("voltages drift by 5 %", drift, ("voltage_drift",), "electrical_q"),
+        Distortion("voltages drift by 5 %", voltage_drift, ("voltage_drift",), "electrical_q"),
+        Distortion("torque drifts by 10 %", torque_drift, ("torque_drift",), "torque"),
         Distortion("torque wanders by 5 %", torque_wave, (), "torque"),
     )

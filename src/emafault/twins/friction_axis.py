@@ -12,13 +12,14 @@ import numpy as np
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     mean_variance,
     nuisance,
     read_arrays,
@@ -90,8 +91,11 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
         raise InputError(
             f"{case}: a cycle has fewer than 6 bins of speed, direction and acceleration with enough samples"
         )
+    parameters = _parameters(scale)
+    starts = {"stribeck": tuple((0.1 * scale["F"], float(np.log(x))) for x in (0.1, 0.4))}
     return MeasuredTwin(
-        NAME, case, tuple(names[:cut]), tuple(names[cut:]), blocks, _parameters(scale), _hypotheses(), _model,
+        NAME, case, tuple(names[:cut]), tuple(names[cut:]), blocks, parameters,
+        library(parameters, _equations(), starts), _model,
         notes=(
             f"{cut} of {len(found)} cycles explore",
             "an error of gtau scales mass and friction alike: this record cannot show it",
@@ -135,7 +139,7 @@ def _block(name: str, x: Arrays, scale: Mapping[str, float], middle: float) -> B
     return Block(cells, np.array([x["F"][rows].mean() for rows in rows_of]), covariance, inputs)
 
 
-def _parameters(scale: Mapping[str, float]):
+def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
     F, v, a = scale["F"], scale["v"], scale["a"]
     return (
         nuisance("M", "kg", 0.5 * F / a, F / a, low=0.0),
@@ -155,20 +159,11 @@ def _parameters(scale: Mapping[str, float]):
     )  # fmt: skip
 
 
-def _hypotheses():
-    torque, zero = ("torque",), ((0.0,),)
-    return (
-        Hypothesis("offset", torque, ("F_0",), zero),
-        Hypothesis("coulomb_asymmetry", torque, ("F_c_difference",), zero),
-        Hypothesis("viscous_asymmetry", torque, ("F_v_difference",), zero),
-        Hypothesis("stribeck", torque, ("F_s", "log_v_s"), ((0.0, float(np.log(0.1))), (0.0, float(np.log(0.4))))),
-        Hypothesis("viscous_nonlinearity", torque, ("F_vv",), zero),
-        Hypothesis("load_spring", torque, ("c",), zero),
-        Hypothesis("friction_position", torque, ("F_q",), zero),
-        Hypothesis("friction_drift", torque, ("F_t",), zero),
-        Hypothesis("offset_drift", ("sensor_current",), ("F_0t",), zero, kind="calibration"),
-        Hypothesis("load_friction", torque, ("mu",), zero),
-    )
+def _equations() -> dict[str, tuple[str, ...]]:
+    friction = ("offset", "coulomb_asymmetry", "viscous_asymmetry", "stribeck", "viscous_nonlinearity")
+    others = ("load_spring", "friction_position", "friction_drift", "load_friction")
+    found: dict[str, tuple[str, ...]] = {effect: ("torque",) for effect in friction + others}
+    return found | {"offset_drift": ("sensor_current",)}
 
 
 def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
@@ -204,11 +199,11 @@ def distortions() -> tuple[Distortion, ...]:
         return forced(a, lambda q, v, t: 0.1 * (q - q.mean()) / np.ptp(q))
 
     def wave(a: Arrays) -> Arrays:
-        return forced(a, lambda q, v, t: 0.1 * np.sin(2 * np.pi * np.abs(v) * 3) * np.sign(v))
+        return forced(a, lambda q, v, t: 0.1 * np.sin(2 * np.pi * t / (0.165 * t[-1])))
 
     return (
         Distortion("constant force", offset, ("offset", "coulomb_asymmetry"), "torque"),
         Distortion("friction higher at low speed", stribeck, ("stribeck",), "torque"),
         Distortion("force in proportion to position", spring, ("load_spring",), "torque"),
-        Distortion("friction that waves over speed", wave, (), "torque"),
+        Distortion("force that waves in time", wave, (), "torque"),
     )

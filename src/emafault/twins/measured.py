@@ -131,6 +131,23 @@ def freedom(
     return Parameter(name, units, off, mean, sd, low, high, 1e-3 * sd, effect=effect)
 
 
+def library(
+    parameters: Sequence[Parameter],
+    equations: Mapping[str, tuple[str, ...]],
+    starts: Mapping[str, tuple[tuple[float, ...], ...]] | None = None,
+) -> tuple[Hypothesis, ...]:
+    """One hypothesis per effect of ``equations``, with its parameters; a fit starts at one prior width unless told.
+
+    An instrument's gain, offset or drift is an effect like any other here: no tolerance of these instruments is known.
+    """
+    found = []
+    for effect, where in equations.items():
+        own = [p for p in parameters if p.effect == effect]
+        usual = tuple(p.mean if p.mean != 0 else min(p.sd, p.high) for p in own)
+        found.append(Hypothesis(effect, where, tuple(p.name for p in own), (starts or {}).get(effect, (usual,))))
+    return tuple(found)
+
+
 def smooth_covariance(x: np.ndarray, sd: float | np.ndarray, length: float) -> np.ndarray:
     """(n, n) covariance of a smooth instrument error of size sd that decorrelates over ``length`` along x.
 

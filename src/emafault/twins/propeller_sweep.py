@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     nuisance,
     read_table,
     require_finite,
@@ -77,9 +78,10 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
         "omega": float(arrays["speed_rpm"].max() * 2 * np.pi / 60),
     }
     blocks = {names[value]: _block(names[value], arrays, arrays[along] == value, scale) for value in values}
+    parameters = _parameters(scale)
     return MeasuredTwin(
         NAME, case, tuple(names[v] for v in values[:cut]), tuple(names[v] for v in values[cut:]), blocks,
-        _parameters(scale), _hypotheses(), _model,
+        parameters, library(parameters, _equations()), _model,
         notes=(
             f"{arrays['v_bus_V'].size} full-throttle rows; {cut} of {len(values)} {along}s explore",
             "a voltage gain is a k gain and a current gain an R gain: no row of these sweeps tells them apart",
@@ -108,7 +110,7 @@ def _block(name: str, arrays: Arrays, rows: np.ndarray, scale: Mapping[str, floa
     return Block(cells, voltage, np.diag(deviation**2), inputs)
 
 
-def _parameters(scale: Mapping[str, float]):
+def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
     k, R = scale["voltage"] / scale["omega"], scale["voltage"] / scale["current"]
     inverse, volt, ampere = 1 / scale["current"], scale["voltage"], scale["current"]
     return (
@@ -126,19 +128,11 @@ def _parameters(scale: Mapping[str, float]):
     )  # fmt: skip
 
 
-def _hypotheses():
-    e = ("electrical",)
-    return (
-        Hypothesis("self_heating", e, ("heating",), ((0.0,),)),
-        Hypothesis("magnet_heating", e, ("weakening",), ((0.0,),)),
-        Hypothesis("commutation_loss", e, ("L_commutation",), ((0.0,),)),
-        Hypothesis("constant_drop", e, ("V_drop",), ((0.0,),)),
-        Hypothesis("voltage_offset", ("sensor_voltage",), ("V_offset",), ((0.0,),), kind="calibration"),
-        Hypothesis("supply_limit", ("bus",), ("V_limit",), ((0.0,),)),
-        Hypothesis("voltage_gain", ("sensor_voltage",), ("gain_v",), ((0.0,),), kind="calibration"),
-        Hypothesis("current_gain", ("sensor_current",), ("gain_i",), ((0.0,),), kind="calibration"),
-        Hypothesis("current_offset", ("sensor_current",), ("i_offset",), ((0.0,),), kind="calibration"),
-    )
+def _equations() -> dict[str, tuple[str, ...]]:
+    electrical = ("self_heating", "magnet_heating", "commutation_loss", "constant_drop")
+    found: dict[str, tuple[str, ...]] = {effect: ("electrical",) for effect in electrical}
+    found |= {"voltage_offset": ("sensor_voltage",), "supply_limit": ("bus",), "voltage_gain": ("sensor_voltage",)}
+    return found | {"current_gain": ("sensor_current",), "current_offset": ("sensor_current",)}
 
 
 def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
@@ -161,12 +155,11 @@ def distortions() -> tuple[Distortion, ...]:
         w = a["speed_rpm"] * 2 * np.pi / 60
         return a | {"v_bus_V": a["v_bus_V"] * (1 + 0.1 * w / w.max() * a["i_bus_A"] / a["i_bus_A"].max())}
 
-    def one_pack(a: Arrays) -> Arrays:
-        low = a["pack"] == a["pack"].min()
-        return a | {"speed_rpm": np.where(low, a["speed_rpm"] * 1.05, a["speed_rpm"])}
+    def alternating(a: Arrays) -> Arrays:
+        return a | {"speed_rpm": a["speed_rpm"] * (1 + 0.02 * (-1.0) ** a["propeller"])}
 
     return (
         Distortion("voltage offset +1 V", drop, ("constant_drop", "voltage_offset"), "sensor_voltage"),
         Distortion("voltage rises with speed x current", commutation, ("commutation_loss",), "electrical"),
-        Distortion("speed +5 % on the low pack", one_pack, (), "electrical"),
+        Distortion("speed 2 % high and low by propeller", alternating, (), "electrical"),
     )

@@ -16,13 +16,14 @@ from scipy.linalg import block_diag
 from scipy.signal import medfilt
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     mean_variance,
     nuisance,
     read_table,
@@ -134,14 +135,15 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
     notes = [f"{cut} plateaus explore, {len(steps) - cut} later ones confirm"]
     if "duty" not in arrays:
         notes.append("no duty in this log: only the power balance is tested, which holds R/k^2 and not R and k")
+    parameters = _parameters(scale)
     return MeasuredTwin(
         NAME,
         case,
         ("first pass",),
         ("return",),
         blocks,
-        _parameters(scale),
-        _hypotheses(arrays),
+        parameters,
+        library(parameters, _equations(arrays)),
         _model,
         notes=tuple(notes),
     )
@@ -217,7 +219,7 @@ def _heat(t: np.ndarray, current: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(t, grid, row) for row in state])
 
 
-def _parameters(scale: Mapping[str, float]):
+def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
     k, R, T = scale["v"] / scale["w"], scale["v"] / scale["i"], scale["T"]
     inverse = 1 / scale["i"]
     return (
@@ -245,36 +247,22 @@ def _parameters(scale: Mapping[str, float]):
     )  # fmt: skip
 
 
-def _hypotheses(arrays: Arrays):
-    zero, e, s_v, s_i = ((0.0,),), "electrical", "sensor_voltage", "sensor_current"
-    found = [
-        Hypothesis("self_heating", (e, "bus"), ("heating", "log_tau"), ((0.0, 2.0),)),
-        Hypothesis("no_load_torque", ("torque", "bus"), ("T_0", "b"), ((0.0, 0.0),)),
-        Hypothesis("torque_gain", ("torque", "bus"), ("gain_T",), zero, kind="calibration"),
-        Hypothesis("voltage_gain_first", (s_v, e), ("gain_v",), zero, kind="calibration"),
-        Hypothesis("current_gain_first", (s_i, e, "torque"), ("gain_i",), zero, kind="calibration"),
-    ]
+def _equations(arrays: Arrays) -> dict[str, tuple[str, ...]]:
+    """The effects that this log can show at all, by equation."""
+    e, s_v, s_i = "electrical", "sensor_voltage", "sensor_current"
+    found: dict[str, tuple[str, ...]] = {"self_heating": (e, "bus")}
     if "duty" in arrays:
-        found += [
-            Hypothesis("magnet_heating", (e, "torque"), ("weakening", "log_tau_m"), ((0.0, 3.0),)),
-            Hypothesis("commutation_loss", (e,), ("L_commutation",), zero),
-            Hypothesis("commutation_advance", (e,), ("advance",), zero),
-            Hypothesis("constant_drop", (e,), ("V_drop",), zero),
-            Hypothesis("freewheel_drop", (e,), ("V_diode",), zero),
-            Hypothesis("duty_offset", (e,), ("duty_offset",), zero, kind="calibration"),
-            Hypothesis("saturation", (e, "torque"), ("saturation",), zero),
-        ]
+        found |= {"magnet_heating": (e, "torque"), "saturation": (e, "torque")}
+        found |= dict.fromkeys(("commutation_loss", "commutation_advance", "constant_drop", "freewheel_drop"), (e,))
+        found |= {"duty_offset": (e,)}
+    if "T" in arrays:
+        found |= {"no_load_torque": ("torque", "bus"), "torque_gain": ("torque", "bus")}
+    found |= {"voltage_gain_first": (s_v, e), "current_gain_first": (s_i, e, "torque")}
     if "v_second" in arrays:
-        found += [
-            Hypothesis("voltage_gain_second", (s_v,), ("gain_v2",), zero, kind="calibration"),
-            Hypothesis("lead_resistance", (s_v,), ("R_lead",), zero),
-        ]
+        found |= {"voltage_gain_second": (s_v,), "lead_resistance": (s_v,)}
     if "i_second" in arrays:
-        found += [
-            Hypothesis("current_gain_second", (s_i,), ("gain_i2",), zero, kind="calibration"),
-            Hypothesis("current_lag", (s_i,), ("lag",), zero),
-        ]
-    return tuple(found)
+        found |= {"current_gain_second": (s_i,), "current_lag": (s_i,)}
+    return found
 
 
 def _at_tau(heat: np.ndarray, log_tau: np.ndarray) -> np.ndarray:
@@ -323,8 +311,8 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
 def distortions() -> tuple[Distortion, ...]:
     """Known changes of a recording and what rightly names each."""
 
-    def torque_gain(a: Arrays) -> Arrays:
-        return a | {"T": a["T"] * 1.3}
+    def current_second(a: Arrays) -> Arrays:
+        return a | {"i_second": a["i_second"] * 1.5}
 
     def voltage_second(a: Arrays) -> Arrays:
         return a | {"v_second": a["v_second"] * 1.1}
@@ -335,13 +323,14 @@ def distortions() -> tuple[Distortion, ...]:
     def heating(a: Arrays) -> Arrays:
         heat = _heat(a["t"], np.where(a["duty"] > 0, a["i"] / np.maximum(a["duty"], 1e-9), 0.0))[12]
         extra = 0.3 * heat / heat.max() * 0.2 * a["v"].max() / a["i"].max() * a["i"]
-        return a | {"v": a["v"] + extra / np.maximum(a["duty"], 0.1)}
+        extra = extra / np.maximum(a["duty"], 0.1)
+        return a | {"v": a["v"] + extra} | ({"v_second": a["v_second"] + extra} if "v_second" in a else {})
 
     def wander(a: Arrays) -> Arrays:
         return a | {"T": a["T"] + 0.05 * a["T"].max() * np.sin(2 * np.pi * a["t"] / 17.0)}
 
     return (
-        Distortion("torque gain +30 %", torque_gain, ("torque_gain",), "torque"),
+        Distortion("second current +50 %", current_second, ("current_gain_second",), "sensor_current"),
         Distortion(
             "second voltage +10 %", voltage_second, ("voltage_gain_second", "voltage_gain_first"), "sensor_voltage"
         ),

@@ -13,13 +13,14 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from emafault.errors import InputError
-from emafault.gap.twin import Cell, Hypothesis
+from emafault.gap.twin import Cell, Parameter
 from emafault.twins.measured import (
     Arrays,
     Block,
     Distortion,
     MeasuredTwin,
     freedom,
+    library,
     mean_variance,
     nuisance,
     read_arrays,
@@ -132,9 +133,10 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
         blocks[name] = _block(name, samples[name], direction, size)
     moving = any(values.ndim == 2 for values in arrays.values())
     model = partial(_model, families=_families(pairs, slots), pairs=pairs)
+    parameters = _parameters(size, pairs, slots, moving)
     return MeasuredTwin(
-        NAME, case, tuple(names[:cut]), tuple(names[cut:]), blocks, _parameters(size, pairs, slots, moving),
-        _hypotheses(pairs, slots, moving), model, notes=tuple(notes),
+        NAME, case, tuple(names[:cut]), tuple(names[cut:]), blocks, parameters,
+        library(parameters, _equations(pairs, slots, moving)), model, notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -185,7 +187,7 @@ def _families(pairs: int, slots: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _parameters(size: float, pairs: int, slots: int, moving: bool):
+def _parameters(size: float, pairs: int, slots: int, moving: bool) -> tuple[Parameter, ...]:
     found = [
         nuisance("i_f", "A", 0.3 * size, size, low=0.0),
         freedom("mean_offset", "i_0", "A", 0.3 * size, -10 * size, 10 * size),
@@ -206,27 +208,11 @@ def _parameters(size: float, pairs: int, slots: int, moving: bool):
     return tuple(found)
 
 
-def _hypotheses(pairs: int, slots: int, moving: bool):
-    torque = ("torque",)
-    found = [Hypothesis("mean_offset", torque, ("i_0",), ((0.0,),), kind="calibration")]
-    for effect, orders in _families(pairs, slots).items():
-        names = tuple(f"{effect}_{part}_{n}" for n in orders for part in ("cos", "sin"))
-        equations = ("sensor_current", "torque") if effect == "current_offset" else torque
-        if names:
-            found.append(Hypothesis(effect, equations, names, ((0.0,) * len(names),)))
-    found.append(
-        Hypothesis(
-            "current_gain",
-            ("sensor_current",),
-            ("current_gain_cos", "current_gain_sin"),
-            ((0.0, 0.0),),
-            kind="calibration",
-        )
-    )
-    if moving:
-        found.append(Hypothesis("inertia", torque, ("J",), ((0.0,),)))
-        found.append(Hypothesis("viscous_friction", torque, ("b",), ((0.0,),)))
-    return tuple(found)
+def _equations(pairs: int, slots: int, moving: bool) -> dict[str, tuple[str, ...]]:
+    found: dict[str, tuple[str, ...]] = {"mean_offset": ("sensor_current",)}
+    found |= {effect: ("torque",) for effect, orders in _families(pairs, slots).items() if orders}
+    found |= {"current_offset": ("sensor_current", "torque"), "current_gain": ("sensor_current",)}
+    return found | ({"inertia": ("torque",), "viscous_friction": ("torque",)} if moving else {})
 
 
 def _model(
@@ -265,10 +251,6 @@ def distortions() -> tuple[Distortion, ...]:
     def orders(a: Arrays) -> tuple[int, int]:
         return find_pole_pairs_and_slots(_profile(_samples(next(iter(a.values())))))
 
-    def external(a: Arrays) -> Arrays:
-        n = orders(a)[0]
-        return each(a, lambda i, theta, size: i + 2 * size * np.cos(n * theta + 0.5))
-
     def magnets(a: Arrays) -> Arrays:
         n = orders(a)[1]
         return each(a, lambda i, theta, size: i + size * np.sin(n * theta))
@@ -282,7 +264,6 @@ def distortions() -> tuple[Distortion, ...]:
         return each(a, lambda i, theta, size: i + 0.5 * size * np.cos(n * theta))
 
     return (
-        Distortion("wave once per pole pair", external, ("current_offset", "stray_field"), "torque"),
         Distortion("wave once per slot", magnets, ("rotor_asymmetry",), "torque"),
         Distortion("wave once per turn", eccentric, ("eccentricity",), "torque"),
         Distortion("wave of an order that no cause has", alien, (), "torque"),
