@@ -17,7 +17,7 @@ from .actuator.parameters import ActuatorParameters, make_runs
 from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
-from .progress import progress
+from .progress import progress, say
 from .recording import PHASES, VARIABLES, Recording, replace_atomically
 
 BLOCK = 25  # runs simulated, written and read at a time
@@ -125,6 +125,28 @@ def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> Non
                 file["fault"][rows] = block.faults
 
     replace_atomically(Path(path), write)
+
+
+def compile_simulation(actuator: Mapping[str, Any], output: str | Path) -> None:
+    """Simulate one short run, which compiles the simulation and fills the cache of compiled code.
+
+    Parameters
+    ----------
+    actuator : parameters of any actuator
+    output : a text file to write; its content is always the same, so that nothing that depends on it looks changed
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    from .actuator.commands import command_positions
+    from .actuator.simulate import simulate
+
+    say("compiling the simulation: once for each version of it, up to a minute")
+    parameters = ActuatorParameters(**actuator)
+    command = command_positions("ramp", {"speed": 0.1}, 0.02, parameters.control_period)
+    simulate(make_runs(parameters, np.zeros((1, 6))), command, 0.02, 2e-4)
+    replace_atomically(Path(output), lambda temporary: temporary.write_text("compiled\n"))
 
 
 def _create(file, spec: Mapping[str, Any], runs: int, samples: int) -> None:

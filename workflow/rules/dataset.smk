@@ -5,12 +5,13 @@ def dataset_spec(wildcards):
     return PLAN.dataset(wildcards.dataset, wildcards.part)
 
 
+# It carries the digest of the simulation itself: what is compiled anew is simulated anew.
 rule compile_simulation:
     output:
         f"{RESULTS}/compiled.txt",
     params:
         spec=configuration.recursively_sorted(vars(configuration.reference_actuator())),
-        code=code("compile_simulation"),
+        code=code("simulate_shard"),
     resources:
         mem_mb=2000,
         runtime=10,
@@ -20,7 +21,7 @@ rule compile_simulation:
 
 rule simulate_shard:
     input:
-        ancient(rules.compile_simulation.output),
+        rules.compile_simulation.output,
     output:
         f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
     params:

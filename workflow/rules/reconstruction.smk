@@ -30,7 +30,7 @@ rule reconstruct_features:
 
 rule compute_bound:
     input:
-        ancient(rules.compile_simulation.output),
+        rules.compile_simulation.output,
     output:
         f"{RESULTS}/experiments/{{case}}/bound.nc",
     params:

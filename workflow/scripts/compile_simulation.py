@@ -1,7 +1,7 @@
-"""Compile the simulation and the reconstructions once, so that jobs that follow find them in the cache."""
+"""Compile the simulation once, so that the jobs that follow find it in the cache."""
 
+from emafault.dataset import compile_simulation
 from emafault.progress import one_line_errors
-from emafault.study.features import compile_everything
 
 with one_line_errors():
-    compile_everything(snakemake.params.spec, snakemake.output[0])
+    compile_simulation(snakemake.params.spec, snakemake.output[0])

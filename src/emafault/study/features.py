@@ -1,6 +1,5 @@
 """Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file; their Cramer-Rao bound."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import BLOCK, count_runs, read_blocks, sample_runs
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..progress import progress, say
+from ..progress import progress
 from ..reconstruction import Features, join_features, reconstruct
 from ..recording import PHASES, replace_atomically
 
@@ -124,38 +123,6 @@ def read_features(path: str | Path) -> FeatureTable:
             return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
     except (OSError, KeyError, ValueError) as error:
         raise InputError(f"{path}: not a readable table of features ({error})") from error
-
-
-def compile_everything(actuator: Mapping[str, Any], output: str | Path) -> None:
-    """Run a short simulation and every reconstruction once, which compiles them and fills the cache of compiled code.
-
-    Parameters
-    ----------
-    actuator : parameters of any actuator
-    output : a text file to write, saying how long it took
-
-    Raises
-    ------
-    InputError : the file cannot be written
-    """
-    from ..actuator.commands import command_positions
-    from ..actuator.parameters import make_runs
-    from ..actuator.sensors import SensorNoise, measure
-    from ..actuator.simulate import simulate
-    from ..reconstruction import METHODS
-
-    start = time.monotonic()
-    say("compiling the simulation, once: this takes up to a minute")
-    parameters, interval = ActuatorParameters(**actuator), 2e-4
-    command = command_positions("parabolic", {"acceleration": 1.0}, 0.5, parameters.control_period)
-    runs = make_runs(parameters, np.zeros((1, 6)))
-    noise = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
-    signals = measure(simulate(runs, command, 0.5, interval), runs, noise, 0)
-    for method in METHODS:
-        reconstruct(method, signals, interval, parameters, {})
-    text = f"compiled in {time.monotonic() - start:.1f} s\n"
-    say(text.strip())
-    replace_atomically(Path(output), lambda temporary: temporary.write_text(text))
 
 
 def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
