@@ -111,8 +111,8 @@ def stretch_centres(subdivisions: int) -> np.ndarray:
 def reconstruct_angle_resolved(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
     """R_j, k_j (its mean over the angle) and the harmonics of k_j(theta), and R and k by stretches of rotor angle.
 
-    ``extras``: ``xi`` (run, 2) and ``xi_covariance`` (run, 2, 2); ``harmonics`` (run, phase, 2 order), which are c_1, s_1,
-    c_2, ... relative to k_j; ``R_theta``, ``k_theta``, ``R_theta_error``, ``k_theta_error`` (run, phase, n);
+    ``extras``: ``xi`` (run, 2) and ``xi_covariance`` (run, 2, 2); ``harmonics`` (run, phase, 2 order), which are c_1,
+    s_1, c_2, ... relative to k_j; ``R_theta``, ``k_theta``, ``R_theta_error``, ``k_theta_error`` (run, phase, n);
     ``chi2`` and ``samples`` (run, phase).
     """
     s = read_settings(AngleResolvedSettings, settings, "angle_resolved")

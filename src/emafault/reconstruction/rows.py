@@ -1,8 +1,9 @@
 """Which samples of a record carry one phase's voltage equation, chosen by rotor angle.
 
 Over a recording interval the mean voltage equation is exact: V = R i + L (i_end - i_start)/interval + k f w, with
-V, i, w the recorded means, as long as f is the trapezoid's mean over the *angle* of the interval. On the plateau f is +1 or -1.
-In the off sector, once the free-wheel current is zero, the terminal floats and V = k f w, f being linear in the angle.
+V, i, w the recorded means, as long as f is the trapezoid's mean over the *angle* of the interval. On the plateau f is
++1 or -1. In the off sector, once the free-wheel current is zero, the terminal floats and V = k f w, f being linear in
+the angle.
 """
 
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ class SampleChoice:
     first: int  # samples dropped at the start
     floating: bool
     zero_current: float  # A, largest measured current that may count as zero
+    clear_of_commutation: bool  # drop a sample if the pair in force changes in it or next to it
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,11 @@ def phase_rows(signals: Signals, end: np.ndarray, run: int, phase: int, choice: 
         choice.first,
         choice.floating,
     )
+    if choice.clear_of_commutation:
+        inside = np.flatnonzero((index >= 2) & (index < signals.speed.shape[1] - 1))
+        sector = np.floor((choice.pole_pairs * signals.angle[run] - np.pi / 6.0) / (np.pi / 3.0))
+        inside = inside[sector[index[inside] - 2] == sector[index[inside] + 1]]
+        index, f, df, floating = index[inside], f[inside], df[inside], floating[inside]
     i, before, after = signals.current[run, index, phase], end[run, index - 1, phase], end[run, index, phase]
     if choice.floating:
         keep = ~floating

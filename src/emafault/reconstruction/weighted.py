@@ -2,9 +2,12 @@
 
 V_j = R_j i_j + k_j f w + L_j di_j/dt + c_j on the plateau, f = +-1; and, as an option, V_j = k_j f w where the terminal
 floats. R_j, k_j, L_j and c_j are unknown; c_j takes up what a current sensor's offset leaves. di/dt comes from the
-currents at the ends of the interval. A record without them falls back on the mean of neighbouring mean currents: the
-switching ripple that this misses, hysteresis/sqrt(3) rms at each end, then counts as noise of the end current, and L is
-held near nominal (30 %).
+currents at the ends of the interval.
+
+A record without end currents falls back on the mean of neighbouring mean currents, clear of commutations. The
+switching ripple that this misses, hysteresis/sqrt(3) rms at each end, counts as noise of the end current, L is held
+near nominal (30 %), and the covariance is widened where residuals exceed what is expected. Errors are two to ten times
+larger then, and at constant speed, where only the ripple tells R from k, several percent.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,7 +19,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .features import Features, Signals, check_number, read_settings
-from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, NoiseLevels, PhaseFit, fit_phase, join_phases
+from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, NoiseLevels, PhaseFit, fit_phase, join_phases, row_variance
 from .rows import Rows, SampleChoice, phase_rows
 
 LOOSE_INDUCTANCE = 0.3  # relative standard deviation of L where di/dt is not measured
@@ -58,7 +61,9 @@ def check_settings(s: WeightedSettings, method: str) -> None:
     check_number(method, "zero_current", s.zero_current, 0.0)
 
 
-def sample_choice(s: WeightedSettings, interval: float, actuator: ActuatorParameters) -> SampleChoice:
+def sample_choice(
+    s: WeightedSettings, interval: float, actuator: ActuatorParameters, end_measured: bool = True
+) -> SampleChoice:
     """Rules for choosing samples from settings in degrees and seconds."""
     return SampleChoice(
         pole_pairs=float(actuator.pole_pairs),
@@ -67,6 +72,7 @@ def sample_choice(s: WeightedSettings, interval: float, actuator: ActuatorParame
         first=round(s.discard / interval),
         floating=bool(s.floating),
         zero_current=s.zero_current,
+        clear_of_commutation=not end_measured,
     )
 
 
@@ -97,7 +103,7 @@ def end_currents(signals: Signals) -> np.ndarray:
     return end
 
 
-def estimate_noise(signals: Signals, run: int, rows: list[Rows], start: np.ndarray, L: float) -> NoiseLevels:
+def estimate_noise(signals: Signals, run: int, rows: list[Rows], start: np.ndarray) -> NoiseLevels:
     """Noise levels of one run from the record itself.
 
     Currents: scatter where the phase floats. Speed: its difference from the turned angle, whose own noise shows as
@@ -112,28 +118,18 @@ def estimate_noise(signals: Signals, run: int, rows: list[Rows], start: np.ndarr
                 quiet_end.append(np.var(signals.current_end[run, zero, j]))
     difference = signals.speed[run, 1:] - np.diff(signals.angle[run]) / signals.interval
     difference = difference - np.mean(difference)
-    speed = np.mean(difference**2) + 2.0 * np.mean(difference[1:] * difference[:-1])
-    current = float(np.mean(quiet_i)) if quiet_i else 0.0
-    end = float(np.mean(quiet_end)) if quiet_end else 0.0
-    guess = NoiseLevels(0.05, np.sqrt(current), np.sqrt(end), np.sqrt(max(speed, 0.0)))
-    remaining, lagged = [], []
+    speed = np.sqrt(max(np.mean(difference**2) + 2.0 * np.mean(difference[1:] * difference[:-1]), 0.0))
+    current = float(np.sqrt(np.mean(quiet_i))) if quiet_i else 0.0
+    end = float(np.sqrt(np.mean(quiet_end))) if quiet_end else 0.0
+    remaining = []
+    guess = NoiseLevels(0.05, current, end, float(speed))
     for r in rows:
         fit = fit_phase(r, r.f[:, None], start, guess, signals.interval)
-        if fit is None:
-            continue
-        own = fit.residual[~r.floating]
-        linked = r.linked[~r.floating]
-        lagged.append(-np.mean(own[linked] * np.roll(own, 1)[linked]) if np.any(linked) else 0.0)
-        slow = (fit.beta[EMF] * guess.speed) ** 2 + (fit.beta[CURRENT] * guess.current) ** 2
-        remaining.append(np.mean(own**2) - slow)
-    if not remaining:
-        return guess
-    if not quiet_end:
-        end = max(float(np.mean(lagged)), 0.0) * (signals.interval / L) ** 2
-    voltage = float(np.mean(remaining)) - 2.0 * end * (L / signals.interval) ** 2
-    return NoiseLevels(
-        float(np.sqrt(max(voltage, QUIET.voltage**2))), float(np.sqrt(current)), float(np.sqrt(end)), guess.speed
-    )
+        if fit is not None:
+            expected, _ = row_variance(r, fit.beta[EMF] * r.f, fit.beta, guess, signals.interval)
+            remaining.append(np.mean(fit.residual**2 - expected) + guess.voltage**2)
+    voltage = np.sqrt(max(float(np.mean(remaining)), QUIET.voltage**2)) if remaining else guess.voltage
+    return NoiseLevels(float(voltage), current, end, float(speed))
 
 
 def nominal_start(actuator: ActuatorParameters, unknowns: int = 4) -> np.ndarray:
@@ -152,7 +148,7 @@ def run_noise(
     else:
         both = SampleChoice(**(choice.__dict__ | {"floating": True}))
         rows = [phase_rows(signals, end, run, j, both) for j in range(3)]
-        noise = estimate_noise(signals, run, rows, nominal_start(actuator), actuator.inductance)
+        noise = estimate_noise(signals, run, rows, nominal_start(actuator))
     if signals.current_end is None:
         ripple = actuator.hysteresis / np.sqrt(3.0)
         noise = NoiseLevels(noise.voltage, noise.current, float(np.hypot(ripple, noise.current)), noise.speed)
@@ -172,7 +168,7 @@ def fit_runs(
     ----------
     shapes : rows -> (row, 1 + harmonics), see ``least_squares.fit_phase``
     """
-    choice = sample_choice(s, signals.interval, actuator)
+    choice = sample_choice(s, signals.interval, actuator, signals.current_end is not None)
     end = end_currents(signals)
     prior_L = np.inf if signals.current_end is not None else LOOSE_INDUCTANCE * actuator.inductance
     start = nominal_start(actuator, 4 + harmonics)
@@ -194,6 +190,8 @@ def fit_runs(
                 array[run] = [fit.beta[column] for fit in known]
             chi2[run] = [fit.chi2 for fit in known]
             covariance[run] = join_phases(known, rows, (CURRENT, EMF))
+            if signals.current_end is None:
+                covariance[run] *= max(1.0, float(np.max(chi2[run])))
             yield RunFit(run, rows, known, noise)
 
     return out, fill()
