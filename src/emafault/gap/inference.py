@@ -24,7 +24,7 @@ class Point:
     misfit: float  # the data's part of the objective
     log_evidence: float
     free: tuple[int, ...]
-    jacobian: np.ndarray  # (statistic, free), whitened
+    jacobian: np.ndarray  # (statistic, free)
     covariance: np.ndarray  # (free, free)
 
 
@@ -37,7 +37,7 @@ class Candidate:
     gain: float
     refined: bool
     start: np.ndarray
-    signature: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (statistic, parameter), whitened
+    signature: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (statistic, parameter)
 
 
 class Problem:
@@ -147,8 +147,9 @@ class Problem:
         free: Sequence[int],
         widened: Sequence[int] = (),
     ) -> np.ndarray:
-        """One Gauss-Newton step within the bounds; ``jacobian`` (statistic, free) is whitened. Returns new values."""
+        """One Gauss-Newton step within the bounds; ``jacobian`` (statistic, free). Returns new values."""
         free = list(free)
+        jacobian = self.whiten(jacobian)
         residual = self.whiten(self.observed - prediction)
         mean, sd = self.prior(free, widened)
         at = values[free]
@@ -188,7 +189,7 @@ class Problem:
         residual = self.whiten(self.observed - prediction)
         misfit = float(residual @ residual)
         objective = misfit + float((((values[free] - mean) / sd) ** 2).sum())
-        scaled = jacobian * sd
+        scaled = self.whiten(jacobian) * sd
         information = np.eye(len(free)) + scaled.T @ scaled
         _, logdet = np.linalg.slogdet(information)
         covariance = np.outer(sd, sd) * np.linalg.inv(information)
@@ -204,7 +205,7 @@ class Problem:
                 settle(values, self.part)
             self.set_covariance(values)
             prediction = self.predict(values)[0]
-            jacobian = self.whiten(self.nuisance_jacobian(values, prediction, self.nuisances))
+            jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
             best = self.point(values, prediction, jacobian, self.nuisances)
             for _ in range(iterations):
                 moved = self.solve(best.values, best.prediction, jacobian, self.nuisances)
@@ -219,6 +220,24 @@ class Problem:
             if round_ == 0 and shifted.max() < 0.05:
                 break
         return best
+
+    def rebase(self, null: Point, candidate: Candidate) -> Point:
+        """Take noise, covariance and nuisance derivatives at a candidate's fit; returns the null refitted under them.
+
+        Where an effect is strong, what was taken at the null fit is wrong by more than the noise.
+        """
+        settle = getattr(self.twin, "settle", None)
+        if settle is not None:
+            settle(candidate.point.values, self.part)
+        self.set_covariance(candidate.point.values)
+        values = candidate.point.values
+        prediction = self.predict(values)[0]
+        base = self.nuisance_jacobian(values, prediction, self.nuisances)
+        best = self.point(null.values, self.predict(null.values)[0], null.jacobian, self.nuisances)
+        moved = self.solve(best.values, best.prediction, null.jacobian, self.nuisances)
+        trial = self.point(moved, self.predict(moved)[0], null.jacobian, self.nuisances)
+        best = trial if trial.objective < best.objective else best
+        return replace(best, jacobian=base)
 
     # ---- effects
     def effect_parameters(self, hypothesis: Hypothesis) -> list[int]:
@@ -251,7 +270,7 @@ class Problem:
                 own = self.effect_parameters(h)
                 free = list(self.nuisances)
                 values = self.solve(null.values, null.prediction, null.jacobian, free, own)
-                moved = null.prediction + self.unwhiten(null.jacobian @ (values - null.values)[free])
+                moved = null.prediction + null.jacobian @ (values - null.values)[free]
                 fitted = self.point(values, moved, null.jacobian, free, own)
                 gain = fitted.log_evidence - null.log_evidence
                 columns = null.jacobian[:, [free.index(m) for m in own]]
@@ -264,17 +283,9 @@ class Problem:
                 columns[:, 0] = (full - null.prediction) / (start[0] - off[0])
             for c, at in partial:
                 columns[:, c] = (full - predictions[at]) / (start[c] - off[c])
-            signature = self.whiten(columns)
             begin = null.values.copy()
             begin[own] = start
-            out.append(self.linear(null, (h,), begin, full, signature))
-        return out
-
-    def unwhiten(self, x: np.ndarray) -> np.ndarray:
-        """C^1/2 x."""
-        out = np.empty_like(x, dtype=float)
-        for rows, factor in self._blocks:
-            out[rows] = factor @ x[rows]
+            out.append(self.linear(null, (h,), begin, full, columns))
         return out
 
     def linear(
@@ -286,7 +297,7 @@ class Problem:
         free = [*self.nuisances, *own]
         jacobian = np.concatenate([null.jacobian, signature], axis=1)
         values = self.solve(begin, prediction, jacobian, free, widened)
-        moved = prediction + self.unwhiten(jacobian @ (values - begin)[free])
+        moved = prediction + jacobian @ (values - begin)[free]
         fitted = self.point(values, moved, jacobian, free, widened)
         effects = tuple(h.effect for h in hypotheses)
         return Candidate(effects, fitted, fitted.log_evidence - null.log_evidence, False, begin, signature)
@@ -294,16 +305,17 @@ class Problem:
     def refine(
         self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int = 2, renew: bool = True
     ) -> Candidate:
-        """Refit a candidate with the simulator: true prediction, effect derivatives renewed once at the solution."""
+        """Refit a candidate with the simulator: true prediction, effect derivatives renewed on the way."""
         chosen = [hypotheses[e] for e in candidate.effects]
         own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
         free = [*self.nuisances, *own]
-        jacobian = candidate.point.jacobian
+        jacobian = candidate.point.jacobian.copy()
+        jacobian[:, : len(self.nuisances)] = null.jacobian
         values = candidate.point.values
         best = self.point(values, self.predict(values)[0], jacobian, free, widened)
         for round_ in range(rounds):
-            if own and renew and round_ == 0:
+            if own and renew and round_ in (0, 2):
                 jacobian = jacobian.copy()
                 steps, points = [], []
                 for m in own:
@@ -315,7 +327,7 @@ class Problem:
                     steps.append(step)
                     points.append(point)
                 differences = (self.predict(np.array(points)) - best.prediction).T / np.array(steps)
-                jacobian[:, len(self.nuisances) :] = self.whiten(differences)
+                jacobian[:, len(self.nuisances) :] = differences
                 best = self.point(best.values, best.prediction, jacobian, free, widened)
             moved = self.solve(best.values, best.prediction, jacobian, free, widened)
             trial = self.point(moved, self.predict(moved)[0], jacobian, free, widened)
@@ -333,9 +345,9 @@ class Problem:
         )
 
     def projected(self, null: Point, columns: np.ndarray) -> np.ndarray:
-        """Whitened columns with the nuisances marginalised: (I + J S J')^-1/2 in the sense of inner products."""
+        """(I + J S J')^-1 x for whitened columns x: what of them the nuisances cannot take up."""
         _, sd = self.prior(self.nuisances)
-        J = null.jacobian * sd
+        J = self.whiten(null.jacobian) * sd
         inner = np.eye(J.shape[1]) + J.T @ J
         return columns - J @ np.linalg.solve(inner, J.T @ columns)
 

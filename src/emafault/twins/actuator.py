@@ -278,7 +278,7 @@ class ActuatorTwin:
         step = float(run["speed_quantisation_step"])
         if step > 0.0:
             sigma = self._brought[name].noise.get("speed", 0.0)
-            rng = np.random.default_rng(0)
+            rng = np.random.default_rng(np.frombuffer(run.tobytes(), np.uint32))
             noisy = signals["rotor_speed"] + sigma * rng.standard_normal(len(signals["rotor_speed"]))
             signals["rotor_speed"] = step * np.round(noisy / step)
         return compute(self._brought[name].nominal, signals, keep)

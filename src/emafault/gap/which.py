@@ -1,0 +1,218 @@
+"""Which effect: evidence of the empty set, every effect, pairs and triples by beam; goodness of fit; groups; unknown."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .inference import Candidate, Point, Problem
+from .twin import Hypothesis
+
+FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
+GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same trace
+REFINED_SINGLES = 5
+REFINED_PAIRS = 3
+STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
+HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
+
+
+@dataclass(frozen=True)
+class Family:
+    """All statistics of one kind over the recordings: how far they are from a prediction, in standard deviations."""
+
+    equation: str
+    label: str
+    along: str
+    excess: float
+    size: int
+
+
+@dataclass(frozen=True)
+class Search:
+    """Everything the decision needs: the null fit, candidates by decreasing gain, misfit by family before and after."""
+
+    null: Point
+    candidates: list[Candidate]
+    singles: list[Candidate]  # linearised, one per effect, for what the data could have shown
+    families: list[Family]  # of the best structural candidate (of the null where there is none)
+    null_families: list[Family]
+
+
+def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
+    """Misfit by kind of statistic, whitened one statistic at a time; largest first.
+
+    ``excess`` is (chi2 - n)/sqrt(2 n) of the family's n statistics.
+    """
+    z = (problem.observed - prediction) / problem.deviations()
+    groups: dict[tuple[str, str, str], list[float]] = {}
+    for cell, value in zip(problem.cells, z, strict=True):
+        groups.setdefault((cell.equation, cell.label, cell.along), []).append(float(value))
+    out = [
+        Family(e, label, along, float((np.square(v).sum() - len(v)) / np.sqrt(2.0 * len(v))), len(v))
+        for (e, label, along), v in groups.items()
+    ]
+    return sorted(out, key=lambda f: -f.excess)
+
+
+def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
+    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances."""
+    own = problem.effect_parameters(hypothesis)
+    return any(abs(point.values[m] - problem.mean[m]) > FAR_OUTSIDE * problem.sd[m] for m in own)
+
+
+def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
+    """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence that one more effect must bring."""
+    null = problem.fit_null()
+    by_id = {h.effect: h for h in hypotheses}
+    screened = problem.screen(null, hypotheses)
+    best_of: dict[str, Candidate] = {}
+    for candidate in screened:
+        effect = candidate.effects[0]
+        if effect not in best_of or candidate.gain > best_of[effect].gain:
+            best_of[effect] = candidate
+    singles = sorted(best_of.values(), key=lambda c: -c.gain)
+    tried: dict[tuple[str, ...], Candidate] = {}
+
+    def accept(candidate: Candidate) -> None:
+        key = tuple(sorted(candidate.effects))
+        if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
+            return
+        if key not in tried or candidate.gain > tried[key].gain:
+            tried[key] = candidate
+
+    count = 0
+    for candidate in sorted(screened, key=lambda c: -c.gain):
+        if candidate.gain < HOPELESS or count >= REFINED_SINGLES + 3:
+            break
+        effect = candidate.effects[0]
+        if count >= REFINED_SINGLES and candidate.gain < 0.5 * singles[0].gain:
+            break
+        rounds = 3 if candidate.gain > 0.5 * singles[0].gain else 2
+        accept(problem.refine(null, candidate, by_id, rounds))
+        count += 1
+    beam = _best(tried, 1)[:2]
+    if beam and beam[0].gain > STRONG:
+        null = problem.rebase(null, beam[0])
+        kept, tried = _best(tried, 1), {}
+        for candidate in kept[:4]:
+            if candidate.gain > 0.2 * beam[0].gain or candidate is kept[1 if len(kept) > 1 else 0]:
+                accept(problem.refine(null, candidate, by_id, 4 if candidate is kept[0] else 2))
+        beam = _best(tried, 1)[:2]
+    for size in (2, 3):
+        grown = _grow(problem, null, beam, singles, by_id, addition)
+        if not grown:
+            break
+        before = {k: v.gain for k, v in tried.items()}
+        for candidate in grown:
+            accept(problem.refine(null, candidate, by_id, 3))
+        new = [c for k, c in tried.items() if k not in before]
+        if not new:
+            break
+        top = max(new, key=lambda c: c.gain)
+        if beam and top.gain < beam[0].gain + addition:
+            break
+        beam = _best(tried, size)[:2]
+    _prune(problem, null, tried, by_id, accept)
+    candidates = sorted(tried.values(), key=lambda c: -c.gain)
+    prediction = candidates[0].point.prediction if candidates else null.prediction
+    after = families(problem, prediction)
+    return Search(null, candidates, singles, after, families(problem, null.prediction))
+
+
+def _best(tried: dict[tuple[str, ...], Candidate], size: int) -> list[Candidate]:
+    chosen = [c for k, c in tried.items() if len(k) == size]
+    return sorted(chosen, key=lambda c: -c.gain)
+
+
+def _grow(
+    problem: Problem,
+    null: Point,
+    beam: Sequence[Candidate],
+    singles: Sequence[Candidate],
+    by_id: dict[str, Hypothesis],
+    addition: float,
+) -> list[Candidate]:
+    """The most promising sets with one effect more than those of the beam, linearised about the beam's fits."""
+    grown: dict[tuple[str, ...], Candidate] = {}
+    for base in beam:
+        for single in singles:
+            effect = single.effects[0]
+            if effect in base.effects:
+                continue
+            chosen = [by_id[e] for e in (*base.effects, effect)]
+            own = [m for e in base.effects for m in problem.effect_parameters(by_id[e]) if by_id[e].kind != "calibration"]
+            inherited = base.point.jacobian[:, [base.point.free.index(m) for m in own]]
+            if by_id[effect].kind == "calibration":
+                signature, begin = inherited, base.point.values
+            else:
+                signature = np.concatenate([inherited, single.signature], axis=1)
+                begin = base.point.values.copy()
+                new = problem.effect_parameters(by_id[effect])
+                # secondary parameters (a Stribeck speed, a damping) keep the start's value: alone they do nothing
+                quiet = [c for c in range(len(new)) if not np.any(single.signature[:, c])]
+                for c in quiet:
+                    begin[new[c]] = single.start[new[c]]
+            candidate = problem.linear(null, chosen, begin, base.point.prediction, signature)
+            if candidate.gain > base.gain + addition:
+                key = tuple(sorted(candidate.effects))
+                if key not in grown or candidate.gain > grown[key].gain:
+                    grown[key] = candidate
+    return sorted(grown.values(), key=lambda c: -c.gain)[:REFINED_PAIRS]
+
+
+def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothesis], accept) -> None:
+    """Refit the best set without each of its members, where that has not been tried: a member may have become idle."""
+    best = max(tried.values(), key=lambda c: c.gain, default=None)
+    while best is not None and len(best.effects) > 1:
+        for effect in best.effects:
+            key = tuple(sorted(e for e in best.effects if e != effect))
+            if key in tried:
+                continue
+            kept = tuple(e for e in best.effects if e != effect)
+            chosen = [by_id[e] for e in kept]
+            own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]
+            begin = best.point.values.copy()
+            for m in problem.effect_parameters(by_id[effect]):
+                begin[m] = problem.mean[m] if by_id[effect].kind == "calibration" else problem.parameters[m].off
+            signature = best.point.jacobian[:, [best.point.free.index(m) for m in own]]
+            candidate = problem.linear(null, chosen, begin, problem.predict(begin)[0], signature)
+            accept(problem.refine(null, candidate, by_id, 2))
+        top = max(tried.values(), key=lambda c: c.gain)
+        if top is best:
+            return
+        best = top
+
+
+def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """The first candidate with those that these data cannot tell from it, then the same for the others of equal size."""
+    if not candidates:
+        return []
+    first = candidates[0]
+    members = [first]
+    for other in candidates[1:]:
+        if set(other.effects) > set(first.effects) or set(other.effects) < set(first.effects):
+            continue
+        difference = problem.whiten(other.point.prediction - first.point.prediction)
+        if problem.squared_distance(null, difference) < GROUP_DISTANCE and first.gain - other.gain < GROUP_DISTANCE / 2:
+            members.append(other)
+    return [members]
+
+
+def confusability(problem: Problem, null: Point, singles: Sequence[Candidate]) -> dict[tuple[str, str], float]:
+    """Cosine of the signatures of every two effects with the nuisances projected out, largest over their parameters."""
+    bases = {}
+    for c in singles:
+        if c.signature.size and np.any(c.signature):
+            signature = problem.whiten(c.signature)
+            columns = problem.projected(null, signature)
+            inner = signature.T @ columns
+            values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+            keep = values > 1e-9 * max(values.max(), 1e-30)
+            bases[c.effects[0]] = (signature @ vectors[:, keep], columns @ vectors[:, keep] / values[keep])
+    out = {}
+    for (a, (raw_a, dual_a)), (b, (raw_b, dual_b)) in combinations(bases.items(), 2):
+        # squared canonical correlations of the two signature spaces under the marginal metric
+        cross = (dual_a.T @ raw_b) @ (dual_b.T @ raw_a)
+        out[a, b] = float(np.sqrt(np.clip(np.max(np.real(np.linalg.eigvals(cross))), 0.0, 1.0)))
+    return out
