@@ -326,6 +326,7 @@ def identification_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     spec = {
         "actuator": config["actuator"],
         "magnet_coefficient": magnet_coefficient(config),
+        "magnet_lag": 0.5 * (config["magnet"]["lag"]["low"] + config["magnet"]["lag"]["high"]),
         "faults": _pick(config["faults"], "N", "xi", "dT"),
     }
     return recursively_sorted(spec)
@@ -352,6 +353,7 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     methods = config["reconstruction"].items()
     spec = {
         "level": config["evaluation"]["level"],
+        "ambient_error": config["sensors"]["ambient"],
         "draws": max(10, config["evaluation"]["seeds"]),
         "plateau_only": {name: entry["method"] == "weighted" and not entry["floating"] for name, entry in methods},
     }

@@ -38,12 +38,13 @@ def shard_bounds(runs: int, shards: int, shard: int) -> tuple[int, int]:
     return runs * shard // shards, runs * (shard + 1) // shards
 
 
-def sample_runs(spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Draw the run records of one part of a dataset.
 
     Parameters
     ----------
     spec : the sub-tree ``config.dataset_spec``
+    faults : (run, 6) given fault vectors; None samples them
 
     Returns
     -------
@@ -52,17 +53,18 @@ def sample_runs(spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     actuator = ActuatorParameters(**spec["actuator"])
     ranges = spec["faults"]
     units, repeats, seed = spec["runs"], spec["recordings_of_a_unit"], spec["seed"]
-    number = units * repeats
-    faults = sample_faults(
-        number,
-        shorted_turns=(ranges["N"]["low"], ranges["N"]["high"]),
-        eccentricity=(ranges["xi"]["low"], ranges["xi"]["high"]),
-        temperature=(ranges["dT"]["low"], ranges["dT"]["high"]),
-        scheme=spec["scheme"],
-        seed=seed,
-    )
-    if spec["healthy"]:
-        faults[:, :5] = 0.0
+    if faults is None:
+        faults = sample_faults(
+            units * repeats,
+            shorted_turns=(ranges["N"]["low"], ranges["N"]["high"]),
+            eccentricity=(ranges["xi"]["low"], ranges["xi"]["high"]),
+            temperature=(ranges["dT"]["low"], ranges["dT"]["high"]),
+            scheme=spec["scheme"],
+            seed=seed,
+        )
+        if spec["healthy"]:
+            faults[:, :5] = 0.0
+    number = len(faults)
     lag, angle = spec["magnet_lag"], spec["recording"]["theta_0"]
     runs = make_runs(
         actuator,
@@ -77,13 +79,15 @@ def sample_runs(spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
         for effect in EFFECTS.values():
             for name, parameter in effect.parameters.items():
                 if parameter.tolerance:
-                    spread = 1.0 + spec["tolerance"] * parameter.tolerance * rng.standard_normal(units)
+                    spread = 1.0 + spec["tolerance"] * parameter.tolerance * rng.standard_normal(number // repeats)
                     runs[effect.field(name)] *= np.repeat(spread, repeats)
     return runs, faults
 
 
-def simulate_blocks(spec: Mapping[str, Any], first: int, last: int) -> Iterator[Block]:
-    """Simulate and measure runs ``first`` to ``last - 1`` of a part, block by block."""
+def simulate_blocks(
+    spec: Mapping[str, Any], first: int, last: int, faults: np.ndarray | None = None
+) -> Iterator[Block]:
+    """Simulate and measure runs ``first`` to ``last - 1`` of a part, block by block; faults as in ``sample_runs``."""
     from .actuator.commands import command_positions
     from .actuator.sensors import SensorNoise, measure
     from .actuator.simulate import simulate
@@ -93,7 +97,7 @@ def simulate_blocks(spec: Mapping[str, Any], first: int, last: int) -> Iterator[
     duration, interval = recording["duration"], recording["interval"]
     command = command_positions(settings.pop("name"), settings, duration, spec["actuator"]["control_period"])
     noise = SensorNoise(**spec["sensors"])
-    runs, faults = sample_runs(spec)
+    runs, faults = sample_runs(spec, faults)
     for start in range(first, last, BLOCK):
         rows = slice(start, min(start + BLOCK, last))
         clean = simulate(runs[rows], command, duration, interval)
@@ -125,6 +129,21 @@ def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> Non
                 file["fault"][rows] = block.faults
 
     replace_atomically(Path(path), write)
+
+
+def simulate_recording(spec: Mapping[str, Any], fault: np.ndarray) -> Recording:
+    """One simulated recording of a given fault, otherwise as a part of a dataset is simulated."""
+    (block,) = simulate_blocks({**spec, "recordings_of_a_unit": 1}, 0, 1, np.asarray(fault, float)[None])
+    signals = {name: values[0] for name, values in block.signals.items()}
+    samples = len(signals["rotor_speed"])
+    attributes = {
+        "title": "simulated recording of an electromechanical actuator",
+        "command": spec["command"]["name"],
+        "health": "seeded" if np.any(fault[:5] != 0.0) else "healthy",
+        "unit": "within tolerance" if spec["tolerance"] else "nominal",
+        "software": f"emafault {__version__}",
+    }
+    return Recording(time=block.interval * np.arange(1, samples + 1), fault=fault, attributes=attributes, **signals)
 
 
 def compile_simulation(actuator: Mapping[str, Any], output: str | Path) -> None:

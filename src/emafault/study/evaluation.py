@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
 from ..identification.identifier import Identifier
+from ..reconstruction.calibration import calibrate
 from ..recording import replace_atomically
 from .features import FeatureTable, read_features
 from .networks import HISTORY, folders, read_json, seed_folder, width_of, write_json
@@ -31,13 +32,17 @@ def read_bound(path: str | Path) -> dict[str, np.ndarray | None]:
     return {name: mean if np.all(np.isfinite(mean)) else None for name, mean in means.items()}
 
 
-def healthy_units(reference: FeatureTable, units: int, spec: Mapping[str, Any]) -> np.ndarray:
-    """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC, from healthy recordings soaked at a measured one."""
+def healthy_units(reference: FeatureTable, units: int, spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC from its healthy recordings, and their covariance."""
     actuator = ActuatorParameters(**spec["actuator"])
-    dT = (reference.ambient_temperature - actuator.reference_temperature)[:, None]
-    copper, magnets = 1.0 + actuator.copper_coefficient * dT, 1.0 + spec["magnet_coefficient"] * dT
-    cold = np.concatenate([reference.features.R / copper, reference.features.k / magnets], axis=1)
-    return np.mean(cold.reshape(units, -1, 6), axis=1)
+    options = {"ambient_error": spec["ambient_error"], "alpha_m": spec["magnet_coefficient"]}
+    six, covariance = np.full((units, 6), np.nan), np.full((units, 6, 6), np.nan)
+    for unit, rows in enumerate(np.arange(len(reference.faults)).reshape(units, -1)):
+        own = reference.rows(rows)
+        if np.any(own.features.identified):
+            found = calibrate(own.features, own.ambient_temperature, actuator, **options)
+            six[unit], covariance[unit] = found.unit, found.covariance
+    return six, covariance
 
 
 def _identifiers(folder: Path) -> list[Identifier]:
@@ -68,20 +73,14 @@ def evaluate_identification(
     tables = {Path(path).stem.removeprefix("fresh_"): read_features(path) for path in fresh}
     units = {Path(path).stem.removeprefix("reference_"): read_features(path) for path in references}
     bounds, width = read_bound(bound_file), width_of(spec["faults"])
-    entries, variables = [], {}
+    entries: list[dict[str, Any]] = []
+    variables: dict[str, Any] = {}
     for folder in folders(histories):
         method, estimator = folder.parent.name, folder.name
         plateau_only = spec["plateau_only"].get(method, False)
         table = tables[method]
-        rows = np.all(np.isfinite(table.inputs), axis=1)
-        unit = None
-        if method in units:
-            unit = healthy_units(units[method], len(rows), spec)
-            rows &= np.all(np.isfinite(unit), axis=1)
-            unit = unit[rows]
-        known = table.rows(rows)
         data = FeatureSet(
-            known.inputs, known.faults, known.covariance, bounds["plateau" if plateau_only else "floating"]
+            table.inputs, table.faults, table.covariance, bounds["plateau" if plateau_only else "floating"]
         )
         models = _identifiers(folder)
         entry: dict[str, Any] = {
@@ -89,23 +88,29 @@ def evaluate_identification(
             "estimator": estimator,
             "seeds": len(models),
             "parameters": models[0].parameters,
-            "unidentified": int(np.sum(~rows)),
             "intervals": models[0].intervals.method,
         }
-        for name, calibration in {"": None, "_calibrated": unit}.items():
-            if name and calibration is None:
-                continue
-            every = [evaluate(model, data, width, spec["level"], calibration) for model in models]
+        calibrations: dict[str, tuple] = {"": (None, None)}
+        if method in units:
+            calibrations["_calibrated"] = healthy_units(units[method], len(table.faults), spec)
+        for name, (unit, covariance) in calibrations.items():
+            known = np.all(np.isfinite(data.features), axis=1)
+            if unit is not None:
+                known &= np.all(np.isfinite(unit), axis=1)
+                unit, covariance = unit[known], _none_if_unknown(covariance[known])
+            rows = data.rows(known)
+            every = [evaluate(model, rows, width, spec["level"], unit, covariance) for model in models]
             entry[f"all{name}"] = over_seeds(every)
             entry[f"few{name}"] = over_seeds(
-                _few(models[seed % len(models)], data, width, spec["level"], calibration, seed)
+                _few(models[seed % len(models)], rows, width, spec["level"], unit, covariance, seed)
                 for seed in range(spec["draws"])
             )
-            value = models[0].predict(data.features, data.covariance, calibration)
-            low, high = models[0].interval(data.features, spec["level"], data.covariance, calibration)
-            for kind, values in {"value": value, "low": low, "high": high, "truth": data.faults}.items():
-                full = np.full((len(rows), 6), np.nan)
-                full[rows] = values
+            entry["unidentified"] = int(np.sum(~known))
+            value = models[0].predict(rows.features, rows.covariance, unit)
+            low, high = models[0].interval(rows.features, spec["level"], rows.covariance, unit, covariance)
+            for kind, values in {"value": value, "low": low, "high": high, "truth": rows.faults}.items():
+                full = np.full((len(known), 6), np.nan)
+                full[known] = values
                 variables[f"{method}.{estimator}{name}.{kind}"] = (("run", "component"), full)
         entries.append(entry)
     shown = {name: None if b is None else _bound_means(b) for name, b in bounds.items()}
@@ -117,12 +122,15 @@ def evaluate_identification(
     replace_atomically(Path(estimates), lambda temporary: data_set.to_netcdf(temporary, engine="netcdf4"))
 
 
-def _few(
-    model, data: FeatureSet, width: np.ndarray, level: float, unit: np.ndarray | None, seed: int
-) -> dict[str, Any]:
+def _none_if_unknown(covariance: np.ndarray) -> np.ndarray | None:
+    return covariance if np.all(np.isfinite(covariance)) else None
+
+
+def _few(model, data: FeatureSet, width: np.ndarray, level: float, unit, covariance, seed: int) -> dict[str, Any]:
     """The paper's terms: ten rows, other ones for each seed."""
     pick = np.random.default_rng([seed, 30]).choice(len(data.faults), min(FEW, len(data.faults)), replace=False)
-    return evaluate(model, data.rows(pick), width, level, None if unit is None else unit[pick])
+    unit, covariance = (None if array is None else array[pick] for array in (unit, covariance))
+    return evaluate(model, data.rows(pick), width, level, unit, covariance)
 
 
 def _bound_means(bound: np.ndarray) -> dict[str, float]:

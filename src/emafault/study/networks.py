@@ -65,6 +65,7 @@ def _fit(estimator: str, table: FeatureTable, spec: Mapping[str, Any], seed: int
         table.faults,
         ActuatorParameters(**spec["actuator"]),
         alpha_m=spec["magnet_coefficient"],
+        lag=spec["magnet_lag"],
         covariance=table.covariance,
         network=spec.get("network"),
         training=spec.get("training"),

@@ -1,0 +1,70 @@
+"""``emafault identify``: recordings -> fault vectors with intervals, by a method and a trained experiment."""
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("files", nargs="+", metavar="FILE_OR_FOLDER", help="recordings, or folders of them (*.nc)")
+    parser.add_argument("--experiment", default="paper", metavar="NAME", help="trained experiment to use (paper)")
+    parser.add_argument("--json", metavar="OUT", help="file to write the estimates to")
+    parser.add_argument(
+        "--reference",
+        nargs="+",
+        default=[],
+        metavar="HEALTHY",
+        help="healthy recordings of the same unit, to calibrate it with",
+    )
+    parser.add_argument(
+        "--method",
+        metavar="RECONSTRUCTION[/ESTIMATOR]",
+        help="such as weighted/network or paper/closed_form; the most accurate of the experiment unless given",
+    )
+    parser.add_argument("--level", type=float, default=0.9, help="of the intervals (0.9)")
+    parser.add_argument("--results", default="results", metavar="DIR", help="folder of results (results)")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Identify, print a table and write the JSON file.
+
+    Raises
+    ------
+    InputError : recordings, a reference, an experiment or a method that cannot be used
+    """
+    import json
+
+    from ..identification.recordings import identify_recordings
+    from ..recording import read_recording, recordings_in, replace_atomically
+    from .model import load_model
+
+    model = load_model(args.experiment, args.method, args.results)
+    paths = recordings_in(args.files)
+    reference = [read_recording(path) for path in recordings_in(args.reference)]
+    found = identify_recordings(model, [read_recording(path) for path in paths], reference, args.level)
+    result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
+    if args.json:
+        text = json.dumps(result, indent=1)
+        replace_atomically(Path(args.json), lambda temporary: temporary.write_text(text + "\n"))
+    print(table(result, args.level))
+    unit = f"calibrated on {len(reference)} healthy recording(s)" if reference else "taken for nominal (no --reference)"
+    print(f"experiment {args.experiment}, method {model.name}, unit {unit}")
+    for path, note in zip(paths, found.notes):
+        if note:
+            print(f"{path}: {note}", file=sys.stderr)
+
+
+def table(result: dict, level: float) -> str:
+    """Estimates and intervals as aligned text."""
+    from ..faults import FAULT_NAMES
+
+    width = max(len("file"), *(len(name) for name in result))
+    lines = [f"{'file':{width}} " + " ".join(f"{name:>28}" for name in FAULT_NAMES)]
+    for name, estimate in result.items():
+        cells = []
+        for component in FAULT_NAMES:
+            e, digits = estimate[component], 2 if component == "dT" else 4
+            cells.append(f"{e['value']:9.{digits}f} [{e['low']:7.{digits}f}, {e['high']:7.{digits}f}]")
+        lines.append(f"{name:{width}} " + " ".join(f"{cell:>28}" for cell in cells))
+    return "\n".join([*lines, f"in brackets {100 * level:.0f} % intervals; N and xi in 1, dT in K above 20 degC"])

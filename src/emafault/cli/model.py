@@ -1,0 +1,86 @@
+"""Which estimator ``emafault identify`` uses: that of a trained experiment, or the closed form where none was trained."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from .. import config as configuration
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from ..identification.identifier import Identifier
+from ..identification.intervals import ConformalIntervals
+from ..identification.recordings import Model
+
+
+def load_model(experiment: str, choice: str | None = None, results: str | Path = "results") -> Model:
+    """The estimator of an experiment.
+
+    Parameters
+    ----------
+    experiment : name of a trained experiment; of one that was not trained here only the closed form is had
+    choice : ``reconstruction`` or ``reconstruction/estimator``; None takes the most accurate on fresh rows
+
+    Raises
+    ------
+    InputError : an unknown experiment, or an estimator that was not trained
+    """
+    folder = Path(results) / "experiments" / experiment
+    trained = (folder / "configuration.yaml").is_file()
+    config = _read_configuration(folder / "configuration.yaml") if trained else configuration.compose(experiment)
+    if config.get("variants") and not trained:
+        raise InputError(
+            f"experiment: '{experiment}' is a study, accepted is one of its variants, {experiment}/<variant>"
+        )
+    methods = config["reconstruction"]
+    known = {f"{p.parent.parent.name}/{p.parent.name}" for p in folder.glob("identifiers/*/*/history.json")}
+    known |= {f"{name}/closed_form" for name in methods}
+    name = choice or _most_accurate(folder, config, known)
+    if "/" not in name:
+        name = next((f"{name}/{e}" for e in ("searched", "network") if f"{name}/{e}" in known), f"{name}/closed_form")
+    if name not in known:
+        hint = (
+            "" if trained else f"; '{experiment}' is not trained here, snakemake --config experiment={experiment} does"
+        )
+        raise InputError(f"--method: got '{choice}', accepted are {', '.join(sorted(known))}{hint}")
+    reconstruction, estimator = name.split("/")
+    settings = dict(methods[reconstruction])
+    saved = folder / "identifiers" / reconstruction / estimator / "seed_0"
+    identifier = Identifier.load(saved) if saved.is_dir() else untrained_closed_form(config)
+    return Model(name, settings.pop("method"), settings, identifier, config["sensors"]["ambient"])
+
+
+def untrained_closed_form(config: Mapping[str, Any]) -> Identifier:
+    """The closed form with intervals from the noise of the features alone, taken as Gaussian."""
+    quantiles = np.sort(np.abs(norm.ppf((np.arange(20_000) + 0.5) / 20_000)))
+    scores = np.repeat(quantiles[:, None], 6, axis=1)
+    intervals = ConformalIntervals("Gaussian noise of the features", scores, np.full(6, 1e-24), np.full(6, np.nan))
+    spec = configuration.identification_spec(config)
+    actuator = ActuatorParameters(**spec["actuator"])
+    return Identifier(actuator, spec["magnet_coefficient"], spec["magnet_lag"], intervals)
+
+
+def _read_configuration(path: Path) -> dict[str, Any]:
+    from omegaconf import OmegaConf
+
+    try:
+        config = OmegaConf.to_container(OmegaConf.load(path))
+    except Exception as error:  # whatever the YAML reader raises
+        raise InputError(f"{path}: not a readable configuration ({' '.join(str(error).split())})") from error
+    if not isinstance(config, dict) or "reconstruction" not in config:
+        raise InputError(f"{path}: not the configuration of an experiment")
+    return {str(key): value for key, value in config.items()}
+
+
+def _most_accurate(folder: Path, config: Mapping[str, Any], known: set[str]) -> str:
+    """The trained estimator with the smallest error over range on fresh rows; without an evaluation the closed form."""
+    try:
+        results = json.loads((folder / "evaluation" / "metrics.json").read_text())["results"]
+        errors = {f"{r['method']}/{r['estimator']}": r["all"]["errors.mean.over_range"]["mean"] for r in results}
+        return min((name for name in errors if name in known), key=lambda name: errors[name])
+    except (OSError, ValueError, KeyError):
+        methods = list(config["reconstruction"])
+        return f"{'weighted_floating' if 'weighted_floating' in methods else methods[-1]}/closed_form"

@@ -1,0 +1,79 @@
+"""Identification of one's own recordings by a reconstruction and an estimator fitted to its features."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..reconstruction import Features
+from ..reconstruction.calibration import calibrate, reconstruct_recordings
+from ..recording import Recording
+from .identifier import Identifier
+
+
+@dataclass(frozen=True)
+class Model:
+    """A reconstruction method with its settings and an estimator fitted to its features."""
+
+    name: str  # reconstruction/estimator
+    method: str
+    settings: Mapping[str, Any]
+    identifier: Identifier
+    ambient_error: float  # K
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Estimates of recordings: for each {"Na": {"value", "low", "high"}, ...}, and a note where one needs caution."""
+
+    estimates: list[dict[str, dict[str, float]]]
+    notes: list[str]
+
+
+def identify_recordings(
+    model: Model, recordings: Sequence[Recording], reference: Sequence[Recording] = (), level: float = 0.9
+) -> Identified:
+    """Identify the fault vector of each recording.
+
+    Parameters
+    ----------
+    reference : healthy recordings of the same unit, to calibrate it with; none takes the unit for nominal
+
+    Raises
+    ------
+    InputError : naming the recording that cannot be used
+    """
+    identifier = model.identifier
+    if not 0.0 < level < 1.0:
+        raise InputError(f"--level: got {level}, accepted is above 0 and below 1")
+    for recording in reference:
+        if recording.health == "seeded":
+            raise InputError(f"{recording.name}: has health 'seeded', a reference must be healthy")
+    features = [reconstruct_recordings([r], model.method, identifier.actuator, model.settings) for r in recordings]
+    for recording, own in zip(recordings, features):
+        if not np.all(own.identified):
+            raise InputError(
+                f"{recording.name}: does not determine R and k of all three phases; a longer motion is needed"
+            )
+    unit = covariance = None
+    if reference:
+        healthy = reconstruct_recordings(reference, model.method, identifier.actuator, model.settings)
+        ambient = np.array([recording.ambient_temperature for recording in reference])
+        options = {"ambient_error": model.ambient_error, "alpha_m": identifier.alpha_m}
+        found = calibrate(healthy, ambient, identifier.actuator, **options)
+        unit, covariance = found.unit, found.covariance if np.all(np.isfinite(found.covariance)) else None
+    estimates, notes = [], []
+    for own in features:
+        inputs = _inputs(own)
+        noise = own.covariance if np.all(np.isfinite(own.covariance)) else None
+        estimates += identifier.estimate(inputs, level, noise, unit, covariance)
+        beyond = float(identifier.outside(inputs, unit)[0])
+        notes.append(f"features lie {beyond:.0%} of their range outside what was learnt from" if beyond > 0.05 else "")
+    return Identified(estimates, notes)
+
+
+def _inputs(features: Features) -> np.ndarray:
+    xi = features.extras.get("xi")
+    return features.six if xi is None else np.concatenate([features.six, xi], axis=1)
