@@ -7,7 +7,7 @@ from emafault.errors import InputError
 from emafault.identification.closed_form import inverse
 from emafault.reconstruction.bounds import cramer_rao_bound, feature_covariance
 from emafault.reconstruction.features import read_signals
-from emafault.reconstruction.least_squares import NoiseLevels
+from emafault.reconstruction.noise import NoiseLevels
 from emafault.reconstruction.rows import phase_rows
 from emafault.reconstruction.weighted import WeightedSettings, sample_choice
 

@@ -16,7 +16,8 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..identification.closed_form import PHASE_AXIS
 from .features import Features, Signals, check_number, read_settings
-from .least_squares import EMF, NoiseLevels, PhaseFit, is_singular, row_variance, whiten
+from .least_squares import EMF, PhaseFit, is_singular, row_variance, whiten
+from .noise import NoiseLevels
 from .rows import Rows
 from .weighted import WeightedSettings, check_settings, fit_runs
 

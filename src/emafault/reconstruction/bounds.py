@@ -17,9 +17,10 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..identification.closed_form import inverse, jacobian, propagate
 from .features import Signals, check_number, read_settings, read_signals
-from .least_squares import CURRENT, EMF, NoiseLevels, design, row_variance
+from .least_squares import CURRENT, EMF, design, row_variance
+from .noise import NoiseLevels, stated_noise
 from .rows import Rows, phase_rows
-from .weighted import WeightedSettings, check_settings, reconstruct_weighted, sample_choice, stated_noise
+from .weighted import WeightedSettings, check_settings, reconstruct_weighted, sample_choice
 
 BAND = 3  # rows that share noise are at most so far apart when ordered by time and phase
 

@@ -11,19 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..actuator.compiled import compiled
+from .noise import NoiseLevels
 from .rows import Rows
 
 CURRENT, EMF, DIDT, INTERCEPT = 0, 1, 2, 3  # columns of every design; further ones are harmonics of k
-
-
-@dataclass(frozen=True)
-class NoiseLevels:
-    """Standard deviations of the recorded values that enter the voltage equation (SI)."""
-
-    voltage: float
-    current: float
-    current_end: float
-    speed: float
 
 
 @dataclass(frozen=True)
@@ -34,7 +25,6 @@ class PhaseFit:
     covariance: np.ndarray  # (unknown, unknown)
     chi2: float  # residual variance over the one expected
     speed_influence: np.ndarray  # (row, unknown) change of beta per unit of standardised speed noise of each row
-    residual: np.ndarray  # (row,) V
 
 
 @compiled
@@ -105,53 +95,60 @@ def is_singular(normal: np.ndarray) -> bool:
     return bool(np.linalg.eigvalsh(normal / np.outer(scale, scale))[0] < 1e-13)
 
 
-def fit_phase(
-    rows: Rows,
-    shapes: np.ndarray,
-    start: np.ndarray,
-    noise: NoiseLevels,
-    interval: float,
-    prior_L: float = np.inf,
-) -> PhaseFit | None:
-    """Fit one phase in two passes: weights at ``start``, then weights at the estimate, corrected for noisy regressors.
+class PhaseProblem:
+    """The least-squares problem of one phase, solved in two passes.
 
     Parameters
     ----------
     shapes : (row, 1 + harmonics) mean of f, and of f times each harmonic, over the interval's angle
-    start : (4 + harmonics,) parameters at which the first weights are taken
+    start : (4 + harmonics,) nominal parameters, at which the first weights are taken
     prior_L : standard deviation of L about ``start`` (H), for records without end currents
-
-    Returns
-    -------
-    None where the rows leave an unknown undetermined
     """
-    unknowns = len(start)
-    if len(rows.V) <= unknowns:
-        return None
-    X, D = design(rows, shapes)
-    prior = np.zeros(unknowns)
-    prior[DIDT] = 0.0 if np.isinf(prior_L) else prior_L**-2
-    beta = start.copy()
-    for last in (False, True):
-        emf = D @ beta
-        variance, coupling = row_variance(rows, emf, beta, noise, interval)
-        residual = rows.V - X @ beta
-        whitened, d, l = whiten(np.column_stack([X, residual]), variance, rows.linked, coupling)
+
+    def __init__(self, rows: Rows, shapes: np.ndarray, start: np.ndarray, interval: float, prior_L: float = np.inf):
+        self.rows, self.start, self.interval = rows, start, interval
+        self.X, self.D = design(rows, shapes)
+        self.end_measured = bool(np.isinf(prior_L))
+        self.prior = np.zeros(len(start))
+        self.prior[DIDT] = 0.0 if self.end_measured else prior_L**-2
+
+    def _weigh(self, beta: np.ndarray, noise: NoiseLevels):
+        """Normal matrix, score and chi2 with weights at ``beta``, and the whitened design with its factors."""
+        variance, coupling = row_variance(self.rows, self.D @ beta, beta, noise, self.interval)
+        residual = self.rows.V - self.X @ beta
+        whitened, d, l = whiten(np.column_stack([self.X, residual]), variance, self.rows.linked, coupling)
         scaled = whitened / np.sqrt(d)[:, None]
         gram = scaled.T @ scaled
-        normal, score = gram[:-1, :-1] + np.diag(prior), gram[:-1, -1] - prior * (beta - start)
-        chi2 = gram[-1, -1] / (len(rows.V) - unknowns)
-        if last:
-            inverse_X, diagonal, below = unwhiten(np.ascontiguousarray(whitened[:, :-1]), d, l)
-            # records quieter than stated, noise-free ones above all, are corrected for the noise that they do have
-            correction = min(1.0, chi2) * regressor_noise(rows, D, diagonal, below, noise, interval, np.isinf(prior_L))
-            normal, score = normal - correction, score + correction @ beta
+        normal, score = gram[:-1, :-1] + np.diag(self.prior), gram[:-1, -1] - self.prior * (beta - self.start)
+        chi2 = float(gram[-1, -1]) / (len(residual) - len(beta))
+        return normal, score, chi2, np.ascontiguousarray(whitened[:, :-1]), d, l
+
+    def first_pass(self, noise: NoiseLevels) -> np.ndarray | None:
+        """(unknown,) plain estimate with weights at the start; None where the rows leave an unknown undetermined."""
+        if len(self.rows.V) <= len(self.start):
+            return None
+        normal, score, *_ = self._weigh(self.start, noise)
+        return None if is_singular(normal) else self.start + np.linalg.solve(normal, score)
+
+    def excess_variance(self, beta: np.ndarray, noise: NoiseLevels) -> float:
+        """Mean square of the residuals at ``beta`` less what the noise levels explain, the voltage's apart (V2)."""
+        expected, _ = row_variance(self.rows, self.D @ beta, beta, noise, self.interval)
+        return float(np.mean((self.rows.V - self.X @ beta) ** 2 - expected)) + noise.voltage**2
+
+    def second_pass(self, beta: np.ndarray, noise: NoiseLevels) -> PhaseFit | None:
+        """Estimate with weights at ``beta``, corrected for noisy regressors; None where an unknown is undetermined."""
+        normal, score, chi2, whitened, d, l = self._weigh(beta, noise)
+        inverse_X, diagonal, below = unwhiten(whitened, d, l)
+        # records quieter than stated, noise-free ones above all, are corrected for the noise that they do have
+        correction = min(1.0, chi2) * regressor_noise(
+            self.rows, self.D, diagonal, below, noise, self.interval, self.end_measured
+        )
+        normal, score = normal - correction, score + correction @ beta
         if is_singular(normal):
             return None
         covariance = np.linalg.inv(normal)
-        beta = beta + covariance @ score
-    influence = inverse_X @ covariance * (emf * noise.speed)[:, None]
-    return PhaseFit(beta, covariance, float(chi2), influence, rows.V - X @ beta)
+        influence = inverse_X @ covariance * (self.D @ beta * noise.speed)[:, None]
+        return PhaseFit(beta + covariance @ score, covariance, chi2, influence)
 
 
 def regressor_noise(rows, D, diagonal, below, noise: NoiseLevels, interval: float, end_measured: bool) -> np.ndarray:

@@ -6,7 +6,7 @@ V, i, w the recorded means, as long as f is the trapezoid's mean over the *angle
 the angle.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -45,6 +45,11 @@ class Rows:
     df: np.ndarray  # its slope by mechanical angle, 1/rad
     theta: np.ndarray  # mechanical angle at the middle of the interval, rad
     delta: np.ndarray  # half the angle turned in the interval, rad
+
+    def conducting(self) -> "Rows":
+        """Without the floating samples."""
+        keep = ~self.floating
+        return Rows(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
 
 
 @compiled

@@ -11,19 +11,17 @@ larger then, and at constant speed, where only the ripple tells R from k, severa
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..errors import InputError
 from .features import Features, Signals, check_number, read_settings
-from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, NoiseLevels, PhaseFit, fit_phase, join_phases, row_variance
+from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, PhaseFit, PhaseProblem, join_phases
+from .noise import LEAST_VOLTAGE, NoiseLevels, sensor_noise, stated_noise
 from .rows import Rows, SampleChoice, phase_rows
 
 LOOSE_INDUCTANCE = 0.3  # relative standard deviation of L where di/dt is not measured
-QUIET = NoiseLevels(voltage=1e-6, current=0.0, current_end=0.0, speed=0.0)
 
 
 @dataclass(frozen=True)
@@ -76,24 +74,6 @@ def sample_choice(
     )
 
 
-def stated_noise(noise: Mapping[str, Any]) -> NoiseLevels:
-    """Noise levels from settings; entries of other sensors are ignored.
-
-    Raises
-    ------
-    InputError : a level that is missing or negative
-    """
-    for key in ("voltage", "current", "current_end", "speed"):
-        if not noise.get(key, -1.0) >= 0.0:
-            raise InputError(
-                f"reconstruction.noise.{key}: got {noise.get(key)!r}, a standard deviation >= 0 is accepted"
-            )
-    quiet = QUIET.voltage
-    return NoiseLevels(
-        max(float(noise["voltage"]), quiet), *(float(noise[key]) for key in ("current", "current_end", "speed"))
-    )
-
-
 def end_currents(signals: Signals) -> np.ndarray:
     """(run, time, phase) currents at the interval's end (A), from neighbouring means where they are not recorded."""
     if signals.current_end is not None:
@@ -103,56 +83,11 @@ def end_currents(signals: Signals) -> np.ndarray:
     return end
 
 
-def estimate_noise(signals: Signals, run: int, rows: list[Rows], start: np.ndarray) -> NoiseLevels:
-    """Noise levels of one run from the record itself.
-
-    Currents: scatter where the phase floats. Speed: its difference from the turned angle, whose own noise shows as
-    the covariance of neighbours. Voltage: what remains of the residual of a first fit.
-    """
-    quiet_i, quiet_end = [], []
-    for j, r in enumerate(rows):
-        zero = r.index[r.floating]
-        if len(zero) > 10:
-            quiet_i.append(np.var(signals.current[run, zero, j]))
-            if signals.current_end is not None:
-                quiet_end.append(np.var(signals.current_end[run, zero, j]))
-    difference = signals.speed[run, 1:] - np.diff(signals.angle[run]) / signals.interval
-    difference = difference - np.mean(difference)
-    speed = np.sqrt(max(np.mean(difference**2) + 2.0 * np.mean(difference[1:] * difference[:-1]), 0.0))
-    current = float(np.sqrt(np.mean(quiet_i))) if quiet_i else 0.0
-    end = float(np.sqrt(np.mean(quiet_end))) if quiet_end else 0.0
-    remaining = []
-    guess = NoiseLevels(0.05, current, end, float(speed))
-    for r in rows:
-        fit = fit_phase(r, r.f[:, None], start, guess, signals.interval)
-        if fit is not None:
-            expected, _ = row_variance(r, fit.beta[EMF] * r.f, fit.beta, guess, signals.interval)
-            remaining.append(np.mean(fit.residual**2 - expected) + guess.voltage**2)
-    voltage = np.sqrt(max(float(np.mean(remaining)), QUIET.voltage**2)) if remaining else guess.voltage
-    return NoiseLevels(float(voltage), current, end, float(speed))
-
-
 def nominal_start(actuator: ActuatorParameters, unknowns: int = 4) -> np.ndarray:
     """(unknown,) nominal R, k, L and zeros."""
     start = np.zeros(unknowns)
     start[[CURRENT, EMF, DIDT]] = actuator.resistance, actuator.back_emf, actuator.inductance
     return start
-
-
-def run_noise(
-    s: WeightedSettings, signals: Signals, end: np.ndarray, run: int, actuator: ActuatorParameters, choice: SampleChoice
-) -> NoiseLevels:
-    """Stated or estimated noise levels of one run, with the ripple as noise of end currents that are not recorded."""
-    if s.noise is not None:
-        noise = stated_noise(s.noise)
-    else:
-        both = SampleChoice(**(choice.__dict__ | {"floating": True}))
-        rows = [phase_rows(signals, end, run, j, both) for j in range(3)]
-        noise = estimate_noise(signals, run, rows, nominal_start(actuator))
-    if signals.current_end is None:
-        ripple = actuator.hysteresis / np.sqrt(3.0)
-        noise = NoiseLevels(noise.voltage, noise.current, float(np.hypot(ripple, noise.current)), noise.speed)
-    return noise
 
 
 def fit_runs(
@@ -166,11 +101,16 @@ def fit_runs(
 
     Parameters
     ----------
-    shapes : rows -> (row, 1 + harmonics), see ``least_squares.fit_phase``
+    shapes : rows -> (row, 1 + harmonics), see ``least_squares.PhaseProblem``
     """
-    choice = sample_choice(s, signals.interval, actuator, signals.current_end is not None)
+    estimated = s.noise is None
+    ends = signals.current_end is not None
+    choice = sample_choice(s, signals.interval, actuator, ends)
+    choice = replace(choice, floating=choice.floating or estimated)
+    stated = None if s.noise is None else stated_noise(s.noise)
+    ripple = actuator.hysteresis / np.sqrt(3.0)
     end = end_currents(signals)
-    prior_L = np.inf if signals.current_end is not None else LOOSE_INDUCTANCE * actuator.inductance
+    prior_L = np.inf if ends else LOOSE_INDUCTANCE * actuator.inductance
     start = nominal_start(actuator, 4 + harmonics)
     R, k, L, offset, chi2 = (np.full((signals.runs, 3), np.nan) for _ in range(5))
     samples = np.zeros((signals.runs, 3), np.int64)
@@ -179,20 +119,30 @@ def fit_runs(
 
     def fill() -> Iterator[RunFit]:
         for run in range(signals.runs):
-            noise = run_noise(s, signals, end, run, actuator, choice)
             rows = [phase_rows(signals, end, run, j, choice) for j in range(3)]
+            noise = sensor_noise(signals, run, rows) if stated is None else stated
+            if not ends:
+                noise = replace(noise, current_end=float(np.hypot(ripple, noise.current)))
+            if estimated and not s.floating:
+                rows = [r.conducting() for r in rows]
             samples[run] = [len(r.V) for r in rows]
-            fits = [fit_phase(r, shapes(r), start, noise, signals.interval, prior_L) for r in rows]
-            known = [fit for fit in fits if fit is not None]
-            if len(known) < 3:
+            problems = [PhaseProblem(r, shapes(r), start, signals.interval, prior_L) for r in rows]
+            first = [(p, beta) for p in problems if (beta := p.first_pass(noise)) is not None]
+            if len(first) < 3:
+                continue
+            if estimated:
+                left = float(np.mean([p.excess_variance(beta, noise) for p, beta in first]))
+                noise = replace(noise, voltage=float(np.sqrt(max(left, LEAST_VOLTAGE**2))))
+            fits = [fit for p, beta in first if (fit := p.second_pass(beta, noise)) is not None]
+            if len(fits) < 3:
                 continue
             for array, column in ((R, CURRENT), (k, EMF), (L, DIDT), (offset, INTERCEPT)):
-                array[run] = [fit.beta[column] for fit in known]
-            chi2[run] = [fit.chi2 for fit in known]
-            covariance[run] = join_phases(known, rows, (CURRENT, EMF))
-            if signals.current_end is None:
+                array[run] = [fit.beta[column] for fit in fits]
+            chi2[run] = [fit.chi2 for fit in fits]
+            covariance[run] = join_phases(fits, rows, (CURRENT, EMF))
+            if not ends:
                 covariance[run] *= max(1.0, float(np.max(chi2[run])))
-            yield RunFit(run, rows, known, noise)
+            yield RunFit(run, rows, fits, noise)
 
     return out, fill()
 
