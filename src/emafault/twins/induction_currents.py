@@ -31,7 +31,8 @@ NAME = "induction_currents"
 RATE = 1000.0  # Hz
 WINDOWS = 6
 REPEATABILITY = 0.012  # of I_1: how well unbalance repeats between recordings of an unchanged machine, at least
-STEADINESS = 0.003  # of I_1: change of unbalance within a recording that a steady machine may show
+STEADINESS = 0.003  # of I_1: change of unbalance within a recording that a sound machine may show
+WANDERING = 0.08  # of its unbalance: change within a recording of a short that warms up or meets the rotor's slip
 UNKNOWN_UNBALANCE = 0.04  # of I_1: supply and sensors, where no healthy recording is given
 HEALTHY = "HLT"
 
@@ -72,7 +73,9 @@ def frequency(i: np.ndarray) -> float:
     window = np.hanning(len(i))[:, None]
     power = (np.abs(np.fft.rfft(i * window, 16 * len(i), axis=0)) ** 2).sum(axis=1)
     first = int(16 * len(i) * 5 / RATE)
-    return float((first + np.argmax(power[first:])) * RATE / (16 * len(i)))
+    peak = min(first + int(np.argmax(power[first:])), power.size - 2)
+    left, middle, right = np.log(power[peak - 1 : peak + 2])
+    return float((peak + 0.5 * (left - right) / (left - 2 * middle + right)) * RATE / (16 * len(i)))
 
 
 def sequences(i: np.ndarray) -> np.ndarray:
@@ -117,7 +120,7 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
     unbalance, zero, spread = _healthy(arrays)
     names = [f"repetition {k + 1}" for k in range(len(i))]
     cut = _explored(i)
-    blocks = {name: _block(name, rows, order, spread) for name, rows in zip(names, i)}
+    blocks = {name: _block(name, rows, order, unbalance, spread) for name, rows in zip(names, i)}
     notes = [f"phase sequence {'A B C' if order > 0 else 'A C B'}"]
     if "healthy" not in arrays:
         notes.append("no healthy recording: supply unbalance and a shorted phase are told apart by size alone")
@@ -138,7 +141,7 @@ def _healthy(arrays: Arrays) -> tuple[complex, complex, float]:
     return complex(means[:, 0].mean()), complex(means[:, 1].mean()), float(max(REPEATABILITY, *scatter))
 
 
-def _block(name: str, i: np.ndarray, order: float, spread: float) -> Block:
+def _block(name: str, i: np.ndarray, order: float, unbalance: complex, spread: float) -> Block:
     s = sequences(i)
     values = np.stack([s[:, 1].real, s[:, 1].imag, s[:, 2].real, s[:, 2].imag], axis=1)
     time = (np.arange(len(s)) + 0.5) * len(i) / RATE / len(s)
@@ -147,7 +150,7 @@ def _block(name: str, i: np.ndarray, order: float, spread: float) -> Block:
     for k, label in enumerate(("Re I2/I1", "Im I2/I1", "Re I0/I1", "Im I0/I1")):
         cells += [Cell(name, ("electrical", "sensor_current")[k // 2], "time", t - half, t + half, label) for t in time]
         kind += [k] * len(s)
-    variance = np.tile(s[:, 3].real ** 2, 4)
+    variance = np.tile(s[:, 3].real ** 2, 4) + (WANDERING * abs(s[:, 1].mean() - unbalance)) ** 2
     # unbalance changes from recording to recording: one error shared by all windows of a repetition
     shared = np.kron(np.eye(4), np.full((len(s), len(s)), min(spread, 2 * REPEATABILITY) ** 2))
     inputs = {"kind": np.array(kind), "order": np.full(len(kind), order)}

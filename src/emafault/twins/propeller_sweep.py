@@ -96,8 +96,8 @@ def _block(name: str, arrays: Arrays, rows: np.ndarray, scale: Mapping[str, floa
         (arrays["i_bus_A"] > (1 - LIMIT_BAND) * scale["current"]).sum() > 2
     )
     cells = [
-        Cell(name, "electrical", "current", float(i), float(i), f"pack {p:g} V, {w:.0f} rad/s")
-        for i, w, p in zip(current, omega, arrays["pack"][rows])
+        Cell(name, "electrical", "current", float(i), float(i), f"pack {p:g} V")
+        for i, p in zip(current, arrays["pack"][rows])
     ]
     slope = 0.15 * scale["voltage"] / scale["current"]
     deviation = np.hypot(VOLTAGE_ACCURACY * voltage, CURRENT_ACCURACY * slope)

@@ -4,7 +4,7 @@ Base model at steady speed, i = i_bus / D the phase current while it flows conti
     D v = k w + R i          (electrical)
     T   = k i                (torque)
     v_bench = v_esc, i_bench = i_esc   (two instruments of one quantity)
-Where the duty is not logged, i = T / k and only the power balance v i_bus - T w = R i^2 is left (bus).
+Where the duty is not logged, i = T / k and only the power balance v i_bus - T w = (R / k^2) T^2 is left (bus).
 """
 
 from collections.abc import Mapping
@@ -188,9 +188,8 @@ def _block(part: str, steps: list[slice], arrays: Arrays, scale: Mapping[str, fl
         table["rise"] = np.array([_rise(t, arrays["i"], rows) for rows in rows_of])
         table["kind"] = np.full(len(rows_of), list(ACCURACY).index(equation))
         table["heat"] = np.array([heat[:, rows].mean(axis=1) for rows in rows_of]).T
-        for rows, current in zip(rows_of, table["bus"]):
-            label = f"{t[rows[0]]:.1f} to {t[rows[-1]]:.1f} s"
-            cells.append(Cell(part, equation, "current", float(current), float(current), label))
+        labels = ["settled"] * len(pieces) + ["after a step"] * (len(rows_of) - len(pieces))
+        cells += [Cell(part, equation, "current", i, i, label) for i, label in zip(table["bus"].tolist(), labels)]
         variance = np.array([mean_variance(values[rows]) for rows in rows_of])
         smooth = smooth_covariance(table["bus"], ACCURACY[equation] * size[equation], 0.3 * scale["i"])
         covariances.append(smooth + np.diag(variance))
@@ -225,6 +224,8 @@ def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
     return (
         nuisance("k", "V s/rad", 0.7 * k, 0.3 * k, low=0.05 * k),
         nuisance("R", "ohm", 0.2 * R, 0.2 * R, low=0.0),
+        # all that a power balance holds of R and k
+        nuisance("R_k2", "W/(N m)2", 0.4 * R / k**2, 0.4 * R / k**2, low=0.0),
         freedom("self_heating", "heating", "1/A2", 0.4 * inverse**2, 0.0, 3 * inverse**2),
         freedom("self_heating", "log_tau", "1", 1.0, 0.0, float(np.log(TAU[-1] / TAU[0])), mean=2.0, off=2.0),
         freedom("magnet_heating", "weakening", "1/A2", 0.1 * inverse**2, 0.0, inverse**2),
@@ -282,10 +283,9 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     true_v = x["v"] / (1 + p["gain_v"])
     k = p["k"] * (1 - p["weakening"] * _at_tau(x["heat"], p["log_tau_m"]))
     drag = p["T_0"] + p["b"] * w
-    with_duty = np.isfinite(x["i"])
-    i = np.where(with_duty, x["i"], 0.0) / (1 + p["gain_i"])
-    i = np.where(with_duty, i, (x["T"] / (1 + p["gain_T"]) + drag) / k)
-    R = p["R"] * (1 + p["heating"] * _at_tau(x["heat"], p["log_tau"]))
+    i = np.where(np.isfinite(x["i"]), x["i"], 0.0) / (1 + p["gain_i"])
+    rise = 1 + p["heating"] * _at_tau(x["heat"], p["log_tau"])
+    R = p["R"] * rise
     k = k * (1 - p["saturation"] * i)
     electrical = k * w + R * i + (p["L_commutation"] - p["advance"]) * w * i + p["V_drop"] + (1 - D) * p["V_diode"]
     # the bridge cannot be on for longer than always, whatever its timer adds
@@ -295,7 +295,8 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     second_voltage = (1 + p["gain_v2"]) * (true_v + p["R_lead"] * true_bus)
     second_current = (1 + p["gain_i2"]) * (true_bus - p["lag"] * x["rise"] / (1 + p["gain_i"]))
     # what the instruments call losses: their own power less the torque they show
-    true_power = R * i**2 + drag * w + x["T"] / (1 + p["gain_T"]) * w
+    true_torque = x["T"] / (1 + p["gain_T"])
+    true_power = p["R_k2"] * rise * (true_torque + drag) ** 2 + (true_torque + drag) * w
     bus = true_power * (1 + p["gain_v"]) * (1 + p["gain_i"]) - x["T"] * w
     result = np.where(kind == names.index("electrical"), electrical, 0.0)
     for name, values in (
