@@ -27,7 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sub = subparsers.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
         if name in given[:1]:
             importlib.import_module(f"{__name__}.{name}").arguments(sub)
-    args = parser.parse_args(given)
+    args, rest = parser.parse_known_args(given)
+    if rest and (not hasattr(args, "overrides") or any(word.startswith("-") for word in rest)):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    if rest:  # overrides that follow an option
+        args.overrides += rest
 
     from ..errors import InputError
 

@@ -23,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="such as weighted/network or paper/closed_form; the most accurate of the experiment unless given",
     )
     parser.add_argument("--level", type=float, default=0.9, help="of the intervals (0.9)")
-    parser.add_argument("--results", default="results", metavar="DIR", help="folder of results (results)")
+    parser.add_argument("--results", metavar="DIR", help="folder of results (results here, else the project's)")
 
 
 def run(args: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""Which estimator ``emafault identify`` uses: that of a trained experiment, or the closed form where none was trained."""
+"""Which estimator ``emafault identify`` uses: a trained experiment's, or the closed form where none was trained."""
 
 import json
 from collections.abc import Mapping
@@ -16,18 +16,21 @@ from ..identification.intervals import ConformalIntervals
 from ..identification.recordings import Model
 
 
-def load_model(experiment: str, choice: str | None = None, results: str | Path = "results") -> Model:
+def load_model(experiment: str, choice: str | None = None, results: str | Path | None = None) -> Model:
     """The estimator of an experiment.
 
     Parameters
     ----------
     experiment : name of a trained experiment; of one that was not trained here only the closed form is had
     choice : ``reconstruction`` or ``reconstruction/estimator``; None takes the most accurate on fresh rows
+    results : folder of results; None takes ``results`` here, else that of the project
 
     Raises
     ------
     InputError : an unknown experiment, or an estimator that was not trained
     """
+    if results is None:
+        results = next((p for p in (Path("results"), configuration.ROOT / "results") if p.is_dir()), "results")
     folder = Path(results) / "experiments" / experiment
     trained = (folder / "configuration.yaml").is_file()
     config = _read_configuration(folder / "configuration.yaml") if trained else configuration.compose(experiment)
@@ -49,6 +52,10 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path =
     reconstruction, estimator = name.split("/")
     settings = dict(methods[reconstruction])
     saved = folder / "identifiers" / reconstruction / estimator / "seed_0"
+    if not saved.is_dir() and settings["method"] == "paper":
+        raise InputError(
+            f"--method: '{name}' has no intervals before training; snakemake --config experiment={experiment}"
+        )
     identifier = Identifier.load(saved) if saved.is_dir() else untrained_closed_form(config)
     return Model(name, settings.pop("method"), settings, identifier, config["sensors"]["ambient"])
 

@@ -20,7 +20,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="Na Nb Nc xi_x xi_y dT as six numbers, or only those that are not zero as Na=0.05 dT=30",
     )
     parser.add_argument("--experiment", default="paper", metavar="NAME", help="experiment to start from (paper)")
-    parser.add_argument("--seed", type=int, default=0, help="of noise, start angle and unit (0)")
+    parser.add_argument("--seed", type=int, default=0, help="of noise and start angle (0)")
+    parser.add_argument("--unit-seed", type=int, default=0, help="which unit, if unit=tolerance is given (0)")
     parser.add_argument("--unit", default="", help="name of the unit, kept in the file")
     parser.add_argument("--health", choices=["healthy", "unknown", "seeded"], help="what the file says of its fault")
 
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> None:
 
     fault, overrides = read_fault(args.fault)
     composed = config.compose(args.experiment, [*args.overrides, *overrides])
-    spec = config.dataset_spec(composed, "fresh") | {"seed": args.seed, "unit_seed": args.seed}
+    spec = config.dataset_spec(composed, "fresh") | {"seed": args.seed, "unit_seed": args.unit_seed}
     recording = simulate_recording(spec, fault)
     attributes = recording.attributes | {"configuration": json.dumps(spec, sort_keys=True)}
     if args.health:
