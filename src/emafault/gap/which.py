@@ -14,6 +14,7 @@ GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same t
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
+REBASES = 3
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 
 
@@ -92,13 +93,19 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         accept(problem.refine(null, candidate, by_id, rounds))
         count += 1
     beam = _best(tried, 1)[:2]
-    if beam and beam[0].gain > STRONG:
+    for round_ in range(REBASES):
+        if not beam or beam[0].gain < STRONG:
+            break
+        before = beam[0].point.misfit
         null = problem.rebase(null, beam[0])
         kept, tried = _best(tried, 1), {}
         for candidate in kept[:4]:
-            if candidate.gain > 0.2 * beam[0].gain or candidate is kept[1 if len(kept) > 1 else 0]:
-                accept(problem.refine(null, candidate, by_id, 4 if candidate is kept[0] else 2))
+            first = candidate is kept[0]
+            if first or candidate.gain > 0.2 * kept[0].gain or (candidate is kept[1] and round_ == 0):
+                accept(problem.refine(null, candidate, by_id, 4 if first else 2))
         beam = _best(tried, 1)[:2]
+        if not beam or beam[0].point.misfit > 0.8 * before or beam[0].point.misfit < 1.2 * len(problem.cells):
+            break
     for size in (2, 3):
         grown = _grow(problem, null, beam, singles, by_id, addition)
         if not grown:
@@ -114,7 +121,8 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             break
         beam = _best(tried, size)[:2]
     _prune(problem, null, tried, by_id, accept)
-    candidates = sorted(tried.values(), key=lambda c: -c.gain)
+    # an effect more must be worth it: ``addition`` is the prior odds against each further member of a set
+    candidates = sorted(tried.values(), key=lambda c: addition * (len(c.effects) - 1) - c.gain)
     prediction = candidates[0].point.prediction if candidates else null.prediction
     after = families(problem, prediction)
     return Search(null, candidates, singles, after, families(problem, null.prediction))
@@ -141,7 +149,9 @@ def _grow(
             if effect in base.effects:
                 continue
             chosen = [by_id[e] for e in (*base.effects, effect)]
-            own = [m for e in base.effects for m in problem.effect_parameters(by_id[e]) if by_id[e].kind != "calibration"]
+            own = [
+                m for e in base.effects for m in problem.effect_parameters(by_id[e]) if by_id[e].kind != "calibration"
+            ]
             inherited = base.point.jacobian[:, [base.point.free.index(m) for m in own]]
             if by_id[effect].kind == "calibration":
                 signature, begin = inherited, base.point.values
@@ -155,9 +165,8 @@ def _grow(
                     begin[new[c]] = single.start[new[c]]
             candidate = problem.linear(null, chosen, begin, base.point.prediction, signature)
             if candidate.gain > base.gain + addition:
-                key = tuple(sorted(candidate.effects))
-                if key not in grown or candidate.gain > grown[key].gain:
-                    grown[key] = candidate
+                # the beam is in order of gain: what is linearised about the better fit is the better linearisation
+                grown.setdefault(tuple(sorted(candidate.effects)), candidate)
     return sorted(grown.values(), key=lambda c: -c.gain)[:REFINED_PAIRS]
 
 
@@ -167,8 +176,9 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
     while best is not None and len(best.effects) > 1:
         for effect in best.effects:
             key = tuple(sorted(e for e in best.effects if e != effect))
-            if key in tried:
-                continue
+            parts = [tried[(e,)].gain for e in key if (e,) in tried]
+            if key in tried and tried[key].gain >= max(parts, default=-np.inf):
+                continue  # it has converged: no worse than any of its own members
             kept = tuple(e for e in best.effects if e != effect)
             chosen = [by_id[e] for e in kept]
             own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]

@@ -1,0 +1,152 @@
+"""From evidence to probabilities and a verdict, with coefficients calibrated on blind cases and then frozen.
+
+Two logistic curves turn what a search has found into probabilities: that there is a gap at all, and, if so, that the best set
+is its cause and not the least bad of a library that lacks the cause. Their coefficients live in a calibration file.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .inference import Candidate, Problem
+from .which import Search, far_outside, groups
+
+DEFAULT = Path(__file__).with_name("calibration.json")
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Frozen coefficients: of the two curves (intercept first) and the gain that one more effect must bring."""
+
+    gap: tuple[float, ...]
+    right: tuple[float, ...]
+    addition: float
+    remainder: float  # largest family excess that an explained bench may leave
+    source: str = ""
+
+    @classmethod
+    def load(cls, path: Path = DEFAULT) -> "Calibration":
+        """Read a calibration file.
+
+        Raises
+        ------
+        InputError : a file that is missing or is no calibration
+        """
+        try:
+            raw = json.loads(path.read_text())
+            return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in raw.items()})
+        except (OSError, ValueError, TypeError) as error:
+            raise InputError(f"{path}: not a calibration file ({error})") from error
+
+    def save(self, path: Path) -> None:
+        """Write the calibration as JSON."""
+        path.write_text(json.dumps(asdict(self), indent=2) + "\n")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the curves see of a search."""
+
+    gain: float  # of the best set over the empty set, in log evidence
+    null_excess: float  # largest family excess of the null fit
+    excess: float  # largest family excess that the best set leaves
+    unexplained: float  # share of the null's excess misfit that the best set leaves
+    margin: float  # gain over the best rival outside the group
+    dof: int
+
+    def gap_features(self) -> np.ndarray:
+        """(1, log gain, log null excess)."""
+        return np.array([1.0, np.log1p(max(self.gain, 0.0)), np.log1p(max(self.null_excess, 0.0))])
+
+    def right_features(self) -> np.ndarray:
+        """(1, log gain, log excess left, log share left, log margin)."""
+        return np.array(
+            [
+                1.0,
+                np.log1p(max(self.gain, 0.0)),
+                np.log1p(max(self.excess, 0.0)),
+                np.log10(max(self.unexplained, 1e-5)),
+                np.log1p(max(self.margin, 0.0)),
+            ]
+        )
+
+
+def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candidate]]:
+    """Summary of a search and the group of its best set."""
+    dof = len(problem.cells)
+    null_excess = found.null_families[0].excess if found.null_families else 0.0
+    if not found.candidates:
+        return Evidence(0.0, null_excess, null_excess, 1.0, 0.0, dof), []
+    group = groups(problem, found.null, found.candidates)[0]
+    best = found.candidates[0]
+    inside = {c.effects for c in group}
+    names = set(best.effects)
+    rivals = [
+        c.gain
+        for c in found.candidates
+        if c.effects not in inside and not (set(c.effects) > names or set(c.effects) < names)
+    ]
+    margin = best.gain - max([*rivals, 0.0])
+    before, after = found.null.misfit - dof, best.point.misfit - dof
+    unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
+    return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
+
+
+def _sigmoid(x: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(x, -30.0, 30.0))))
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Verdict, probabilities that sum to one (sets, the empty set, unknown) and the group of the first set."""
+
+    verdict: str
+    sets: list[tuple[Candidate, float]]
+    empty: float
+    unknown: float
+    group: list[Candidate]
+    evidence: Evidence
+
+
+def decide(problem: Problem, found: Search, hypotheses: Sequence, calibration: Calibration) -> Decision:
+    """Turn a search into a verdict by the frozen curves."""
+    evidence, group = evidence_of(problem, found)
+    p_gap = _sigmoid(float(np.dot(calibration.gap, evidence.gap_features())))
+    if not found.candidates:
+        unknown = p_gap
+        return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
+    p_right = _sigmoid(float(np.dot(calibration.right, evidence.right_features())))
+    weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
+    weights /= weights.sum()
+    sets = [(c, float(p_gap * p_right * w)) for c, w in zip(group, weights, strict=True)]
+    inside = {c.effects for c in group}
+    rivals = [c for c in found.candidates if c.effects not in inside][:6]
+    rest = p_gap * (1.0 - p_right)
+    if rivals:
+        # what is not believed of the first set goes to its rivals by their evidence and, at least half, to the unknown
+        odds = np.exp(np.clip([c.gain - group[0].gain for c in rivals], -30.0, 0.0))
+        share = 0.5 * odds / max(1.0, odds.sum())
+        sets += [(c, float(rest * s)) for c, s in zip(rivals, share, strict=True)]
+        rest -= rest * float(share.sum())
+    empty = 1.0 - p_gap
+    named = p_gap * p_right
+    if empty >= max(named, rest):
+        verdict = "no_gap"
+    elif rest > named:
+        verdict = "unknown"
+    elif len(group) > 1:
+        verdict = "group"
+    elif evidence.excess > calibration.remainder:
+        verdict = "partly"
+    else:
+        verdict = "explained"
+    return Decision(verdict, sets, empty, rest, group, evidence)
+
+
+def is_named(problem: Problem, hypothesis, candidate: Candidate) -> bool:
+    """Whether a member of a set is far enough from its off value to be named (calibration effects by tolerance)."""
+    return hypothesis.kind != "calibration" or far_outside(problem, hypothesis, candidate.point)

@@ -1,0 +1,141 @@
+"""How far the gap shrinks on recordings that took no part in fitting or choosing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .inference import Candidate, Point, Problem
+from .twin import Twin
+
+PLACEBOS = 20
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model on the confirm recordings: root mean square of the whitened residual and where it stands."""
+
+    rms: float
+    values: np.ndarray
+    residual: np.ndarray  # (statistic,) whitened
+
+
+def own_nuisances(problem: Problem) -> list[int]:
+    """Parameters refitted on the confirm recordings: each one's soak temperature and, if seeded, its fault."""
+    out = []
+    for m in problem.nuisances:
+        p = problem.parameters[m]
+        if p.recordings is not None and len(p.recordings) == 1 and (p.fault in (None, "dT") or "seeded" in p.name):
+            out.append(m)
+    return out
+
+
+def refit(problem: Problem, values: np.ndarray, free: Sequence[int]) -> Rung:
+    """Refit only ``free`` on the problem's recordings and return the residual; all else stays as it is."""
+    prediction = problem.predict(values)[0]
+    jacobian = np.zeros((len(problem.cells), 0))
+    if free:
+        jacobian = problem.nuisance_jacobian(values, prediction, free)
+        for _ in range(2):
+            moved = problem.solve(values, prediction, jacobian, free)
+            trial = problem.predict(moved)[0]
+            old, new = (float(np.square(problem.whiten(problem.observed - q)).sum()) for q in (prediction, trial))
+            if new >= old:
+                break
+            values, prediction = moved, trial
+    residual = problem.whiten(problem.observed - prediction)
+    return Rung(float(np.sqrt(np.mean(residual**2))), values, residual)
+
+
+def without_tolerance(explore: Problem, null: Point) -> np.ndarray:
+    """The null fit with every parameter that belongs to the unit held at its nominal value."""
+    unit = [m for m in explore.nuisances if explore.parameters[m].recordings is None]
+    free = [m for m in explore.nuisances if m not in unit]
+    values = null.values.copy()
+    values[unit] = explore.mean[unit]
+    columns = [explore.nuisances.index(m) for m in free]
+    prediction = explore.predict(values)[0]
+    for _ in range(2):
+        moved = explore.solve(values, prediction, null.jacobian[:, columns], free)
+        trial = explore.predict(moved)[0]
+        old, new = (float(np.square(explore.whiten(explore.observed - q)).sum()) for q in (prediction, trial))
+        if new >= old:
+            break
+        values, prediction = moved, trial
+    return values
+
+
+def placebo(
+    explore: Problem, confirm: Problem, null: Point, recalibrated: Rung, free: Sequence[int], count: int
+) -> float:
+    """Median over random signatures with ``count`` parameters of the confirm residual's root mean square.
+
+    A random signature has one random number per kind of statistic, the same in all recordings, in units of its noise.
+    Its amplitude is fitted on the explore recordings, nuisances marginalised, and carried over.
+    """
+    rng = np.random.default_rng(20)
+    kinds = sorted({(c.equation, c.label) for c in (*explore.cells, *confirm.cells)})
+    index = {kind: m for m, kind in enumerate(kinds)}
+    of_explore = np.array([index[c.equation, c.label] for c in explore.cells])
+    of_confirm = np.array([index[c.equation, c.label] for c in confirm.cells])
+    residual = explore.whiten(explore.observed - null.prediction)
+    out = []
+    for _ in range(PLACEBOS):
+        drawn = rng.standard_normal((len(kinds), max(count, 1)))
+        here = explore.whiten(drawn[of_explore] * explore.deviations()[:, None])
+        there = confirm.whiten(drawn[of_confirm] * confirm.deviations()[:, None])
+        marginal = explore.projected(null, here)
+        amplitude = np.linalg.solve(here.T @ marginal + 1e-9 * np.eye(here.shape[1]), marginal.T @ residual)
+        out.append(float(np.sqrt(np.mean((recalibrated.residual - there @ amplitude) ** 2))))
+    return float(np.median(out))
+
+
+def closed(recalibrated: float, after: float, floor: float, size: int) -> float | None:
+    """Share of the closable gap that is closed; None where the closable gap is below twice its standard error."""
+    closable = recalibrated**2 - floor**2
+    error = recalibrated**2 * np.sqrt(2.0 / max(size, 1))
+    if closable < 2.0 * error:
+        return None
+    return float((recalibrated**2 - after**2) / closable)
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """The rungs on the confirm recordings, with the values each model ended at."""
+
+    problem: Problem
+    nominal: Rung
+    recalibrated: Rung
+    placebo: float
+    after: Rung
+
+    def signal(self) -> dict:
+        """The verdict file's entry; the floor is the noise itself."""
+        entry = {
+            "nominal": self.nominal.rms,
+            "recalibrated": self.recalibrated.rms,
+            "placebo": self.placebo,
+            "after": self.after.rms,
+            "floor": 1.0,
+        }
+        size = len(self.problem.cells)
+        return entry | {"closed": closed(self.recalibrated.rms, self.after.rms, 1.0, size)}
+
+
+def climb(twin: Twin, confirm: Sequence[str], explore: Problem, null: Point, best: Candidate | None) -> Ladder:
+    """Open the confirm recordings and put every model on them."""
+    problem = Problem(twin, confirm)
+    settled = best.point.values if best is not None else null.values
+    settle = getattr(twin, "settle", None)
+    if settle is not None:
+        settle(settled, confirm)
+    problem.set_covariance(settled)
+    free = own_nuisances(problem)
+    # without_tolerance predicts the explore recordings again: their noise has been settled before
+    nominal = refit(problem, without_tolerance(explore, null), free)
+    recalibrated = refit(problem, null.values, free)
+    if best is None:
+        return Ladder(problem, nominal, recalibrated, recalibrated.rms, recalibrated)
+    count = len(best.point.free) - len(explore.nuisances)
+    blind = placebo(explore, problem, null, recalibrated, free, count)
+    return Ladder(problem, nominal, recalibrated, blind, refit(problem, best.point.values, free))
