@@ -41,7 +41,7 @@ def equation_of(families: Sequence[Family]) -> str:
             name = "electrical"
         totals[name] = totals.get(name, 0.0) + excess
     best = max(totals, key=lambda k: totals[k])
-    if best == "electrical":
+    if best == "electrical" and phases:
         first = max(phases, key=lambda k: phases[k])
         if phases[first] > 0.8 * totals["electrical"]:
             return first
