@@ -20,14 +20,20 @@ include: "workflow/rules/report.smk"
 rule study:
     default_target: True
     input:
-        case_files("evaluation/metrics.json"),
-        case_files("configuration.yaml"),
+        f"{EXPERIMENT}/report.html",
+        case_files("report.html"),
+        case_files("tracked.json"),
 
 
 rule datasets:
     """Only simulate."""
     input:
-        [path for case in PLAN.cases for part in case.parts for path in shards(case, part)],
+        [
+            path
+            for case in PLAN.cases
+            for part in case.parts
+            for path in shards(case, part)
+        ],
 
 
 rule features:

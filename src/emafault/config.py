@@ -316,6 +316,11 @@ def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     return recursively_sorted(spec)
 
 
+def examples_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What the recordings shown in the paper's figures read."""
+    return recursively_sorted({"dataset": dataset_spec(config, "fresh"), "discard": config["recording"]["discard"]})
+
+
 def magnet_coefficient(config: Mapping[str, Any]) -> float:
     """The magnets' temperature coefficient (1/K) that estimators are told."""
     return all_effects(config).get("magnet_temperature", {}).get("alpha_m", 0.0)

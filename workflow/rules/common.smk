@@ -13,7 +13,9 @@ RESULTS = "results"
 SCRIPTS = workflow.basedir + "/workflow/scripts"
 
 try:
-    PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
+    PLAN = configuration.plan(
+        config.get("experiment", "paper"), config.get("overrides", "")
+    )
 except InputError as error:
     sys.exit(f"emafault: {error}")
 
@@ -27,7 +29,9 @@ wildcard_constraints:
     dataset="|".join(DATASETS),
     part="|".join(configuration.PARTS),
     shard=r"\d+",
-    method="|".join(sorted({name for case in PLAN.cases for name in case.config["reconstruction"]})),
+    method="|".join(
+        sorted({name for case in PLAN.cases for name in case.config["reconstruction"]})
+    ),
     estimator="closed_form|network|searched",
     worker=r"\d+",
 
@@ -49,13 +53,20 @@ def case_files(name):
 def shards(case, part):
     """The files of one part of a case's dataset."""
     number = case.config["sampling"]["shards"]
-    return [f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc" for shard in range(number)]
+    return [
+        f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc"
+        for shard in range(number)
+    ]
 
 
 def all_features(case):
     """Every table of features of a case."""
     folder = f"{RESULTS}/experiments/{case.path}/features"
-    return [f"{folder}/{part}_{method}.nc" for part in case.parts for method in case.config["reconstruction"]]
+    return [
+        f"{folder}/{part}_{method}.nc"
+        for part in case.parts
+        for method in case.config["reconstruction"]
+    ]
 
 
 def estimators(case, method):

@@ -9,12 +9,12 @@ def dataset_spec(wildcards):
 rule compile_simulation:
     output:
         f"{RESULTS}/compiled.txt",
-    params:
-        spec=configuration.recursively_sorted(vars(configuration.reference_actuator())),
-        code=code("simulate_shard"),
     resources:
         mem_mb=2000,
         runtime=10,
+    params:
+        spec=configuration.recursively_sorted(vars(configuration.reference_actuator())),
+        code=code("simulate_shard"),
     script:
         "../scripts/compile_simulation.py"
 
@@ -24,11 +24,11 @@ rule simulate_shard:
         rules.compile_simulation.output,
     output:
         f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
-    params:
-        spec=dataset_spec,
-        code=code("simulate_shard"),
     resources:
         mem_mb=1000,
         runtime=60,
+    params:
+        spec=dataset_spec,
+        code=code("simulate_shard"),
     script:
         "../scripts/simulate_shard.py"

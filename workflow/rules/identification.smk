@@ -3,12 +3,19 @@ CASE = f"{RESULTS}/experiments/{{case}}"
 
 
 def training_features(wildcards):
-    method = getattr(wildcards, "method", None) or case_of(wildcards).config["search"]["reconstruction"]
+    method = (
+        getattr(wildcards, "method", None)
+        or case_of(wildcards).config["search"]["reconstruction"]
+    )
     return f"{RESULTS}/experiments/{wildcards.case}/features/training_{method}.nc"
 
 
 def chosen_network(wildcards):
-    return f"{RESULTS}/experiments/{wildcards.case}/search/chosen.json" if wildcards.estimator == "searched" else []
+    return (
+        f"{RESULTS}/experiments/{wildcards.case}/search/chosen.json"
+        if wildcards.estimator == "searched"
+        else []
+    )
 
 
 def training_spec(wildcards):
@@ -26,20 +33,31 @@ def search_storage(wildcards):
 
 def searching_workers(wildcards):
     number = case_of(wildcards).config["search"]["workers"]
-    return [f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json" for worker in range(number)]
+    return [
+        f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json"
+        for worker in range(number)
+    ]
 
 
 def histories(wildcards):
     case = case_of(wildcards)
     folder = f"{RESULTS}/experiments/{case.path}/identifiers"
     methods = case.config["reconstruction"]
-    return [f"{folder}/{method}/{name}/history.json" for method in methods for name in estimators(case, method)]
+    return [
+        f"{folder}/{method}/{name}/history.json"
+        for method in methods
+        for name in estimators(case, method)
+    ]
 
 
 def features_of(part):
     def paths(wildcards):
         case = case_of(wildcards)
-        return [path for path in all_features(case) if path.split("/")[-1].startswith(f"{part}_")]
+        return [
+            path
+            for path in all_features(case)
+            if path.split("/")[-1].startswith(f"{part}_")
+        ]
 
     return paths
 
@@ -48,7 +66,9 @@ def exported_identifier(wildcards):
     case = case_of(wildcards)
     search = case.config["search"]
     methods = list(case.config["reconstruction"])
-    method = search["reconstruction"] if search["reconstruction"] in methods else methods[-1]
+    method = (
+        search["reconstruction"] if search["reconstruction"] in methods else methods[-1]
+    )
     estimator = "searched" if search["trials"] else "network"
     return f"{RESULTS}/experiments/{case.path}/identifiers/{method}/{estimator}/history.json"
 
@@ -62,13 +82,13 @@ rule search_network:
         training_features,
     output:
         f"{CASE}/search/worker_{{worker}}.json",
+    resources:
+        mem_mb=2000,
+        runtime=240,
     params:
         spec=search_spec,
         code=code("search_network"),
         storage=search_storage,
-    resources:
-        mem_mb=2000,
-        runtime=240,
     script:
         "../scripts/search_network.py"
 
@@ -80,13 +100,13 @@ rule choose_network:
     output:
         trials=f"{CASE}/search/trials.json",
         chosen=f"{CASE}/search/chosen.json",
+    resources:
+        mem_mb=2000,
+        runtime=10,
     params:
         spec=search_spec,
         code=code("choose_network"),
         storage=search_storage,
-    resources:
-        mem_mb=2000,
-        runtime=10,
     script:
         "../scripts/choose_network.py"
 
@@ -97,12 +117,12 @@ rule train_identifier:
         chosen=chosen_network,
     output:
         f"{CASE}/identifiers/{{method}}/{{estimator}}/history.json",
-    params:
-        spec=training_spec,
-        code=code("train_identifier"),
     resources:
         mem_mb=2000,
         runtime=60,
+    params:
+        spec=training_spec,
+        code=code("train_identifier"),
     script:
         "../scripts/train_identifier.py"
 
@@ -114,11 +134,11 @@ rule export_network:
     output:
         model=f"{CASE}/export/network.onnx",
         check=f"{CASE}/export/check.json",
-    params:
-        code=code("export_network"),
     resources:
         mem_mb=2000,
         runtime=10,
+    params:
+        code=code("export_network"),
     script:
         "../scripts/export_network.py"
 
@@ -132,11 +152,11 @@ rule evaluate_identification:
     output:
         metrics=f"{CASE}/evaluation/metrics.json",
         estimates=f"{CASE}/evaluation/estimates.nc",
-    params:
-        spec=evaluation_spec,
-        code=code("evaluate_identification"),
     resources:
         mem_mb=2000,
         runtime=30,
+    params:
+        spec=evaluation_spec,
+        code=code("evaluate_identification"),
     script:
         "../scripts/evaluate_identification.py"

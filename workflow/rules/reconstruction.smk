@@ -6,7 +6,9 @@ def shards_of_part(wildcards):
 
 
 def reconstruction_spec(wildcards):
-    return configuration.reconstruction_spec(case_of(wildcards).config, wildcards.method)
+    return configuration.reconstruction_spec(
+        case_of(wildcards).config, wildcards.method
+    )
 
 
 def bound_spec(wildcards):
@@ -18,12 +20,12 @@ rule reconstruct_features:
         shards_of_part,
     output:
         f"{RESULTS}/experiments/{{case}}/features/{{part}}_{{method}}.nc",
-    params:
-        spec=reconstruction_spec,
-        code=code("reconstruct_features"),
     resources:
         mem_mb=2000,
         runtime=60,
+    params:
+        spec=reconstruction_spec,
+        code=code("reconstruct_features"),
     script:
         "../scripts/reconstruct_features.py"
 
@@ -33,11 +35,11 @@ rule compute_bound:
         rules.compile_simulation.output,
     output:
         f"{RESULTS}/experiments/{{case}}/bound.nc",
-    params:
-        spec=bound_spec,
-        code=code("compute_bound"),
     resources:
         mem_mb=2000,
         runtime=60,
+    params:
+        spec=bound_spec,
+        code=code("compute_bound"),
     script:
         "../scripts/compute_bound.py"

@@ -1,15 +1,130 @@
 # The resolved configuration is written down, figures are drawn, everything is tracked.
 
 
+def examples_spec(wildcards):
+    return configuration.examples_spec(case_of(wildcards).config)
+
+
 def whole_configuration(wildcards):
     return configuration.recursively_sorted(case_of(wildcards).config)
+
+
+def title_and_question(wildcards):
+    return {"title": wildcards.case, "question": case_of(wildcards).config["question"]}
+
+
+def search_results(wildcards):
+    trials = case_of(wildcards).config["search"]["trials"]
+    names = ("trials", "chosen") if trials else ()
+    return [
+        f"{RESULTS}/experiments/{wildcards.case}/search/{name}.json" for name in names
+    ]
 
 
 rule write_configuration:
     output:
         f"{CASE}/configuration.yaml",
+    localrule: True
     params:
         spec=whole_configuration,
         code=code("write_configuration"),
     script:
         "../scripts/write_configuration.py"
+
+
+rule simulate_examples:
+    input:
+        rules.compile_simulation.output,
+    output:
+        f"{CASE}/examples.nc",
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        spec=examples_spec,
+        code=code("simulate_examples"),
+    script:
+        "../scripts/simulate_examples.py"
+
+
+rule draw_report:
+    input:
+        metrics=rules.evaluate_identification.output.metrics,
+        estimates=rules.evaluate_identification.output.estimates,
+        histories=histories,
+        examples=rules.simulate_examples.output,
+        search=search_results,
+        configuration=rules.write_configuration.output,
+    output:
+        report=f"{CASE}/report.html",
+        figures=directory(f"{CASE}/figures"),
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        spec=title_and_question,
+        code=code("draw_report"),
+    script:
+        "../scripts/draw_report.py"
+
+
+if PLAN.is_study:
+
+    rule compare_variants:
+        input:
+            case_files("evaluation/metrics.json"),
+        output:
+            report=f"{EXPERIMENT}/report.html",
+            figures=directory(f"{EXPERIMENT}/figures"),
+        resources:
+            mem_mb=1000,
+            runtime=10,
+        params:
+            spec={
+                "title": PLAN.name,
+                "question": PLAN.question,
+                "variants": [case.path.split("/")[-1] for case in PLAN.cases],
+            },
+            code=code("compare_variants"),
+        script:
+            "../scripts/compare_variants.py"
+
+
+# The database is neither input nor output of a rule; one job writes at a time (profiles/default).
+rule prepare_tracking:
+    output:
+        f"{RESULTS}/tracking.json",
+    localrule: True
+    resources:
+        tracking=1,
+        mem_mb=1000,
+        runtime=10,
+    params:
+        spec=configuration.recursively_sorted(PLAN.cases[0].config["tracking"]),
+        code=code("prepare_tracking"),
+    script:
+        "../scripts/prepare_tracking.py"
+
+
+rule track_evaluation:
+    input:
+        where=rules.prepare_tracking.output,
+        metrics=rules.evaluate_identification.output.metrics,
+        histories=histories,
+        search=search_results,
+        model=rules.export_network.output.model,
+        report=rules.draw_report.output.report,
+        figures=rules.draw_report.output.figures,
+        configuration=rules.write_configuration.output,
+    output:
+        f"{CASE}/tracked.json",
+    localrule: True
+    resources:
+        tracking=1,
+        mem_mb=1000,
+        runtime=10,
+    params:
+        spec=whole_configuration,
+        code=code("track_evaluation"),
+    script:
+        "../scripts/track_evaluation.py"

@@ -1,0 +1,146 @@
+"""MLflow: one database and experiment, created once, one writer at a time, everything logged in batches.
+
+The tracking server's address is a setting. A local SQLite file is locked while it is written, since MLflow breaks when
+several processes create or migrate one.
+"""
+
+import contextlib
+import fcntl
+import json
+import logging
+import os
+import subprocess
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+from .errors import InputError
+
+_SQLITE = "sqlite:///"
+_LONGEST_VALUE = 6000
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What one MLflow run holds; ``children`` become nested runs."""
+
+    name: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    curves: Mapping[str, list[float]] = field(default_factory=dict)  # metric over steps
+    tags: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str | Path] = field(default_factory=dict)  # file or folder -> folder among the artifacts
+    children: tuple["Entry", ...] = ()
+
+
+def code_version() -> str:
+    """Version of the package with the commit it was run from, if it is a git checkout; ``+`` marks changes."""
+    folder = Path(__file__).parent
+    try:
+        text = subprocess.run(
+            ["git", "describe", "--always", "--dirty=+", "--abbrev=10"], cwd=folder, capture_output=True, text=True
+        )
+        return f"{__version__} {text.stdout.strip()}".strip()
+    except OSError:
+        return __version__
+
+
+def flatten(value: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one level with dotted names."""
+    flat: dict[str, Any] = {}
+    for key, item in value.items():
+        flat |= flatten(item, f"{prefix}{key}.") if isinstance(item, Mapping) and item else {f"{prefix}{key}": item}
+    return flat
+
+
+def ensure_experiment(uri: str, experiment: str) -> str:
+    """Identifier of the experiment; database and experiment are created where they do not exist.
+
+    Raises
+    ------
+    InputError : a server or file that cannot be used
+    """
+    with _client(uri) as client:
+        return _experiment_id(client, uri, experiment)
+
+
+def log_run(uri: str, experiment: str, entry: Entry) -> str:
+    """Log one run with its children and return its identifier.
+
+    Raises
+    ------
+    InputError : a server or file that cannot be used
+    """
+    with _client(uri) as client:
+        return _log(client, _experiment_id(client, uri, experiment), entry, {})
+
+
+def _log(client, experiment_id: str, entry: Entry, tags: Mapping[str, str]) -> str:
+    from mlflow.entities import Metric, Param
+
+    now = int(1000 * time.time())
+    every = {"mlflow.source.name": "emafault", "code_version": code_version(), **entry.tags, **tags}
+    run = client.create_run(experiment_id, start_time=now, run_name=entry.name, tags=every).info.run_id
+    parameters = [Param(key, str(value)[:_LONGEST_VALUE]) for key, value in flatten(entry.parameters).items()]
+    metrics = [Metric(_name(key), float(value), now, 0) for key, value in entry.metrics.items() if value == value]
+    for key, values in entry.curves.items():
+        metrics += [Metric(_name(key), float(value), now, step) for step, value in enumerate(values)]
+    for part in _pieces(parameters, 100):
+        client.log_batch(run, params=part)
+    for part in _pieces(metrics, 1000):
+        client.log_batch(run, metrics=part)
+    for path, folder in entry.files.items():
+        log = client.log_artifacts if Path(path).is_dir() else client.log_artifact
+        log(run, str(path), folder or None)
+    for child in entry.children:
+        _log(client, experiment_id, child, {"mlflow.parentRunId": run})
+    client.set_terminated(run)
+    return run
+
+
+def _name(key: str) -> str:
+    """A metric's name with what MLflow accepts."""
+    return "".join(c if c.isalnum() or c in "_-. /" else "_" for c in key)
+
+
+def _pieces(items: list, size: int) -> Iterable[list]:
+    return [items[start : start + size] for start in range(0, len(items), size)]
+
+
+def _experiment_id(client, uri: str, name: str) -> str:
+    found = client.get_experiment_by_name(name)
+    if found:
+        return found.experiment_id
+    location = None
+    if uri.startswith(_SQLITE):
+        location = (Path(uri.removeprefix(_SQLITE)).resolve().parent / "mlflow_artifacts").as_uri()
+    return client.create_experiment(name, artifact_location=location)
+
+
+@contextlib.contextmanager
+def _client(uri: str) -> Iterator[Any]:
+    """A client, with the local database locked while it is open."""
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    for name in ("mlflow", "alembic"):
+        logging.getLogger(name).setLevel(logging.WARNING)
+    from mlflow import MlflowClient
+    from mlflow.exceptions import MlflowException
+
+    with contextlib.ExitStack() as stack:
+        try:
+            if uri.startswith(_SQLITE):
+                path = Path(uri.removeprefix(_SQLITE))
+                path.parent.mkdir(parents=True, exist_ok=True)
+                lock = stack.enter_context(open(path.with_name(f".{path.name}.lock"), "w"))
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            yield MlflowClient(tracking_uri=uri)
+        except (MlflowException, OSError) as error:
+            raise InputError(f"tracking.uri: {uri} cannot be used ({' '.join(str(error).split())[:300]})") from error
+
+
+def read_tracked(path: str | Path) -> dict[str, Any]:
+    """What a tracking rule wrote: the address, experiment and run."""
+    return json.loads(Path(path).read_text())

@@ -1,0 +1,19 @@
+"""Draw the report of one experiment."""
+
+from emafault.progress import one_line_errors
+from emafault.study.report import draw_report
+
+with one_line_errors():
+    given, spec = snakemake.input, snakemake.params.spec
+    draw_report(
+        spec["title"],
+        spec["question"],
+        given.metrics,
+        given.estimates,
+        given.histories,
+        given.examples[0],
+        given.search,
+        given.configuration[0],
+        snakemake.output.report,
+        snakemake.output.figures,
+    )

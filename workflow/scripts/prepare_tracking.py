@@ -1,0 +1,7 @@
+"""Create the tracking database and its experiment once."""
+
+from emafault.progress import one_line_errors
+from emafault.study.tracked import prepare_tracking
+
+with one_line_errors():
+    prepare_tracking(snakemake.params.spec, snakemake.output[0])

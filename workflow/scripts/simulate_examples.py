@@ -1,0 +1,7 @@
+"""Simulate the recordings that the paper's figures show."""
+
+from emafault.progress import one_line_errors
+from emafault.study.examples import simulate_examples
+
+with one_line_errors():
+    simulate_examples(snakemake.params.spec, snakemake.output[0])

@@ -1,0 +1,18 @@
+"""Log one evaluation with its search."""
+
+from emafault.progress import one_line_errors
+from emafault.study.tracked import track_evaluation
+
+with one_line_errors():
+    given = snakemake.input
+    files = {given.model: "model", given.report: "", given.figures: "figures", given.configuration[0]: ""}
+    track_evaluation(
+        snakemake.wildcards.case,
+        snakemake.params.spec,
+        given.where[0],
+        given.metrics,
+        given.histories,
+        given.search,
+        files,
+        snakemake.output[0],
+    )
