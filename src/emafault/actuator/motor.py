@@ -19,7 +19,7 @@ PAIR = np.array([[0, 1], [0, 2], [1, 2], [1, 0], [2, 0], [2, 1]])
 @compiled
 def trapezoid(x, ramp):
     """Unit trapezoid f(x) and its slope; x electrical rad, ``ramp`` = (pi - plateau width)/2 (pi/6 for 120 degrees)."""
-    x = x % TWO_PI
+    x -= TWO_PI * np.floor(x * (1.0 / TWO_PI))  # several times faster than the remainder operator
     if x < ramp:
         return x / ramp, 1.0 / ramp
     if x < np.pi - ramp:

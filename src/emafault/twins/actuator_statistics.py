@@ -28,7 +28,8 @@ EQUATIONS = (
     "control",
 )
 SPEED_EDGES = (2.0, 8.0, 20.0, 50.0, 110.0, 1.0e9)  # rad/s
-ORDERS = (1, 2, 4, 8, 12, 24, 36, 72)  # of the mechanical turn
+ORDERS = (1, 2, 4, 8, 12, 24, 36, 72)  # of the mechanical turn; each the double or the sum of earlier ones
+_MADE_FROM = np.array([(-1, -1), (0, 0), (1, 1), (2, 2), (3, 2), (4, 4), (5, 4), (6, 6)])
 ANGLE_BINS = 12
 MARGIN = np.deg2rad(3.5)  # electrical, kept from the corners of the trapezoid
 WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
@@ -130,6 +131,7 @@ LATTICE = _SPEED + 4
 OSCILLATION = _POSITION + 5
 _SPEEDS = np.array(SPEED_EDGES)
 _ORDER_LIST = np.array(ORDERS, float)
+_COS_AXIS, _SIN_AXIS = np.cos(AXIS), np.sin(AXIS)
 
 
 def cells_of(recording: str) -> list[Cell]:
@@ -157,6 +159,12 @@ class Nominal:
         )
         has_end, has_bus = recording.phase_current_end is not None, recording.bus_voltage is not None
         return cls(constants, recording.interval, has_end, has_bus)
+
+
+@compiled
+def _wrap(x, period):
+    """x modulo a period; several times faster than the remainder operator."""
+    return x - period * np.floor(x / period)
 
 
 @compiled
@@ -210,6 +218,7 @@ def fill_statistics(
     pair_mean = np.zeros(n_time)
     integral, demand = 0.0, 0.0
     f, slope, x = np.empty(3), np.empty(3), np.empty(3)
+    turn_cos, turn_sin = np.empty(len(ORDERS)), np.empty(len(ORDERS))
     plateau, floating, was_off, sign = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     smooth_play, play_power = 0.0, 0.0
     for n in range(1, n_time):
@@ -221,9 +230,15 @@ def fill_statistics(
         sum_i = i[n, 0] + i[n, 1] + i[n, 2]
         level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
         cos_1, sin_1 = np.cos(middle), np.sin(middle)
+        cos_p, sin_p = np.cos(poles * middle), np.sin(poles * middle)
+        turn_cos[0], turn_sin[0] = cos_1, sin_1
+        for o in range(1, _ORDER_LIST.shape[0]):
+            u, v = _MADE_FROM[o, 0], _MADE_FROM[o, 1]
+            turn_cos[o] = turn_cos[u] * turn_cos[v] - turn_sin[u] * turn_sin[v]
+            turn_sin[o] = turn_sin[u] * turn_cos[v] + turn_cos[u] * turn_sin[v]
         drive, sum_r, sum_f = 0.0, 0.0, 0.0
         for j in range(3):
-            x[j] = (poles * middle - AXIS[j]) % TWO_PI
+            x[j] = _wrap(poles * middle - AXIS[j], TWO_PI)
             if span < 1e-6:
                 f[j], slope[j] = trapezoid(x[j], ramp)
             else:
@@ -233,7 +248,7 @@ def fill_statistics(
                 f[j] = (f_low + 4.0 * f_mid + f_high) / 6.0
             drive += k * f[j] * i[n, j]
             sum_f += f[j]
-            half = x[j] % np.pi
+            half = x[j] if x[j] < np.pi else x[j] - np.pi
             sign[j] = 1.0 if x[j] < np.pi else -1.0
             plateau[j] = 1.0 if ramp + margin < half < np.pi - ramp - margin else 0.0
             off_now = 1.0 if half > np.pi - ramp + margin or half < ramp - margin else 0.0
@@ -273,8 +288,13 @@ def fill_statistics(
                 _put(base + 17, n, i[n, j], r, y, norm, count, store)
                 _put(base + 18, n, f[j] * w, r, y, norm, count, store)
             if span < 0.35:
-                _put(base + 19, n, w * np.sin(5.0 * x[j]), r, y, norm, count, store)
-                _put(base + 20, n, w * np.sin(7.0 * x[j]), r, y, norm, count, store)
+                # sin 5x and sin 7x as polynomials of sin x
+                sx = sin_p * _COS_AXIS[j] - cos_p * _SIN_AXIS[j]
+                s2 = sx * sx
+                sin_5 = sx * (5.0 + s2 * (-20.0 + 16.0 * s2))
+                sin_7 = sx * (7.0 + s2 * (-56.0 + s2 * (112.0 - 64.0 * s2)))
+                _put(base + 19, n, w * sin_5, r, y, norm, count, store)
+                _put(base + 20, n, w * sin_7, r, y, norm, count, store)
                 _put(base + 21 + min(ANGLE_BINS - 1, int(x[j] / TWO_PI * ANGLE_BINS)), n, w, r, y, norm, count, store)
         # ---- sums over the phases
         residual[3, n] = sum_i
@@ -310,9 +330,8 @@ def fill_statistics(
             for o in range(_ORDER_LIST.shape[0]):
                 reach = _ORDER_LIST[o] * abs(w) * dt
                 if reach < 2.0:
-                    part = _ORDER_LIST[o] * middle
-                    _put(_ORDERS + 2 * o, n, np.cos(part), r, y, norm, count, store)
-                    _put(_ORDERS + 2 * o + 1, n, np.sin(part), r, y, norm, count, store)
+                    _put(_ORDERS + 2 * o, n, turn_cos[o], r, y, norm, count, store)
+                    _put(_ORDERS + 2 * o + 1, n, turn_sin[o], r, y, norm, count, store)
         # ---- play between the rotor and the user shaft
         r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
         residual[7, n] = r
@@ -342,7 +361,7 @@ def fill_statistics(
             integral = advanced
         plus = minus = 0
         for j in range(3):
-            shifted = (poles * middle - AXIS[j] - ramp) % TWO_PI
+            shifted = _wrap(x[j] - ramp, TWO_PI)
             if shifted < 2.0 * np.pi / 3.0:
                 plus = j
             elif np.pi <= shifted < 5.0 * np.pi / 3.0:
@@ -358,7 +377,7 @@ def fill_statistics(
         # ---- currents around the commutations
         if moving and abs(pair_mean[n]) > 0.2:
             for j in range(3):
-                half = x[j] % np.pi
+                half = x[j] if x[j] < np.pi else x[j] - np.pi
                 share = min(max(sign[j] * i[n, j] / pair_mean[n], -0.5), 1.5)
                 base = _COMMUTATION + 4 * j
                 if 0.0 < ramp - half < WINDOW:
