@@ -31,6 +31,7 @@ NAME = "dq_machine"
 COLUMNS = ("u_d", "u_q", "i_d", "i_q", "motor_speed", "torque", "pm", "stator_winding")
 REFERENCE_TEMPERATURE = 20.0  # degC, at which R, psi and the inductances are stated
 ACCURACY = 0.005  # of the largest value: how far the recorded voltages and torque are trusted
+IRON_LOSS = 0.02  # of the apparent power: iron loss that a machine of this kind has
 STEADY = 0.01  # relative change of speed or current between rows above which a row is a transient
 SETTLE = 4  # rows dropped after each transient
 BLOCKS = 40  # statistics blocks per part, at most
@@ -153,7 +154,7 @@ def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
         freedom("saturation_d", "saturation_d", "1/A", 0.3 * inverse, -inverse, inverse),
         freedom("saturation_q", "saturation_q", "1/A", 0.3 * inverse, 0.0, inverse),
         freedom("cross_saturation", "cross_saturation", "V s/(rad A2)", 0.1 * cross, -cross, cross),
-        freedom("iron_loss", "G_iron", "1/ohm", 0.05 / impedance, 0.0, 1 / impedance),
+        freedom("iron_loss", "G_iron", "1/ohm", IRON_LOSS / impedance, 0.0, 1 / impedance),
         freedom("iron_loss", "T_iron", "N m", 0.02 * torque, 0.0, 0.2 * torque),
         freedom("voltage_error", "V_drop", "V", 0.02 * voltage, -0.2 * voltage, 0.2 * voltage),
         freedom("angle_offset", "delta", "rad", 0.03, -0.3, 0.3),

@@ -226,13 +226,14 @@ def distortions() -> tuple[Distortion, ...]:
             extra[k] = wave[:, None] * np.array([-0.5, -0.5, 1.0])
         return a | {"i": i + extra}
 
-    def swing(a: Arrays) -> Arrays:
+    def pickup(a: Arrays) -> Arrays:
+        """The same current beside the line's frequency on all channels: it beats in the zero sequence."""
         t = np.arange(a["i"].shape[1]) / RATE
-        wave = 1 + 0.3 * np.sin(2 * np.pi * 1.5 * t)[:, None] * np.array([1.0, 0.0, 0.0])
-        return a | {"i": a["i"] * wave}
+        beat = np.sin(2 * np.pi * (frequency(a["i"][0]) + 1.5) * t)
+        return a | {"i": a["i"] + 0.3 * a["i"].std() * beat[:, None]}
 
     return (
         Distortion("second channel's gain +30 %", gain, ("current_gain_b",), "sensor_current"),
         Distortion("short in phase C", short, ("shorted_turns_c",), "electrical"),
-        Distortion("first channel's gain swings", swing, (), "sensor_current"),
+        Distortion("pick-up that beats with the line", pickup, (), "sensor_current"),
     )

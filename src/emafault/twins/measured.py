@@ -38,7 +38,7 @@ class Block:
 Model = Callable[[Mapping[str, np.ndarray], Block], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass
 class MeasuredTwin:
     """A measured machine as the diagnosis sees it (see ``emafault.gap.twin.Twin``).
 
@@ -51,8 +51,8 @@ class MeasuredTwin:
     explore: tuple[str, ...]
     confirm: tuple[str, ...]
     blocks: Mapping[str, Block]
-    parameters: tuple[Parameter, ...]
-    hypotheses: tuple[Hypothesis, ...]
+    parameters: Sequence[Parameter]
+    hypotheses: Sequence[Hypothesis]
     model: Model
     notes: tuple[str, ...] = ()
 

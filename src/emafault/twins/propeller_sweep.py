@@ -149,7 +149,7 @@ def distortions() -> tuple[Distortion, ...]:
     """Known changes of a recording and what rightly names each."""
 
     def drop(a: Arrays) -> Arrays:
-        return a | {"v_bus_V": a["v_bus_V"] + 1.0}
+        return a | {"v_bus_V": a["v_bus_V"] + 3.0}
 
     def commutation(a: Arrays) -> Arrays:
         w = a["speed_rpm"] * 2 * np.pi / 60
@@ -159,7 +159,7 @@ def distortions() -> tuple[Distortion, ...]:
         return a | {"speed_rpm": a["speed_rpm"] * (1 + 0.02 * (-1.0) ** a["propeller"])}
 
     return (
-        Distortion("voltage offset +1 V", drop, ("constant_drop", "voltage_offset"), "sensor_voltage"),
+        Distortion("voltage offset +3 V", drop, ("constant_drop", "voltage_offset"), "sensor_voltage"),
         Distortion("voltage rises with speed x current", commutation, ("commutation_loss",), "electrical"),
         Distortion("speed 2 % high and low by propeller", alternating, (), "electrical"),
     )

@@ -256,7 +256,7 @@ def distortions() -> tuple[Distortion, ...]:
         return each(a, lambda i, theta, size: i + size * np.sin(n * theta))
 
     def eccentric(a: Arrays) -> Arrays:
-        return each(a, lambda i, theta, size: i + 0.5 * size * np.cos(theta))
+        return each(a, lambda i, theta, size: i + 1.5 * size * np.cos(theta))
 
     def alien(a: Arrays) -> Arrays:
         p, slots = orders(a)

@@ -1,0 +1,69 @@
+"""What of a verdict survives the recordings that took no part in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .diagnose import Diagnosis
+from .how_far import own_nuisances, refit
+
+RIVALS = 12
+VISIBLE = 1.3  # root mean square from which a misfit on the confirm recordings is more than their noise
+WORSE = 0.95  # of the recalibrated residual: a named set that leaves more than this has not helped
+BETTER = 0.7  # of the named set's residual: a rival that leaves less than this is preferred
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted set: gain in log evidence where it was fitted, root mean square on the confirm recordings."""
+
+    effects: tuple[str, ...]
+    gain: float
+    rms: float
+
+
+def held_out(diagnosis: Diagnosis) -> dict:
+    """Outcome of the named set on the confirm recordings, beside every other set that was fitted.
+
+    Returns
+    -------
+    ``outcome``: ``holds``; ``contradicted``, the named set leaves these recordings no better than the recalibrated
+    nominal model does; ``rival``, a set that fitted the explore recordings less well leaves them much better;
+    ``not seen``, they show no gap; ``no claim``, nothing was named.
+    ``claimed``: the effects that are left to claim: the named set, or what it shares with the rivals that hold better.
+    ``rivals``: effects, gain in log evidence on the explore recordings and root mean square on these, best first.
+    """
+    ladder, decision = diagnosis.ladder, diagnosis.decision
+    candidates = diagnosis.found.candidates[:RIVALS]
+    if ladder is None or not candidates:
+        return {"outcome": "no claim", "claimed": [], "rivals": []}
+    problem = ladder.problem
+    free = own_nuisances(problem)
+    rivals = [Rival(c.effects, c.gain, refit(problem, c.point.values, free).rms) for c in candidates]
+    best = rivals[0]
+    before = ladder.recalibrated.rms
+    named = decision.verdict in ("explained", "group", "partly")
+    better = [r for r in rivals[1:] if r.rms < BETTER * best.rms and r.rms < WORSE * before]
+    visible = max(VISIBLE, 1.0 + 2.0 / np.sqrt(2.0 * len(problem.cells)))
+    claimed: Sequence[str] = ()
+    if not named:
+        outcome = "no claim"
+    elif before < visible and best.rms < visible:
+        outcome, claimed = "not seen", best.effects
+    elif best.rms > VISIBLE and better:
+        outcome, claimed = "rival", shared([best.effects, *(r.effects for r in better)])
+    elif best.rms > WORSE * before:
+        outcome = "contradicted"
+    else:
+        outcome, claimed = "holds", best.effects
+    listed = [
+        {"effects": list(r.effects), "log_evidence_gain": round(r.gain, 2), "rms": round(r.rms, 4)}
+        for r in sorted(rivals, key=lambda r: r.rms)
+    ]
+    return {"outcome": outcome, "claimed": list(claimed), "rivals": listed}
+
+
+def shared(sets: Sequence[Sequence[str]]) -> list[str]:
+    """Effects that all sets have, in the order of the first."""
+    return [e for e in sets[0] if all(e in other for other in sets[1:])]
