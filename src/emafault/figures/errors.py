@@ -45,19 +45,27 @@ def error_boxes(errors: Mapping[tuple[str, str], np.ndarray], bound: Mapping[str
     return figure
 
 
-def estimates_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, truth: np.ndarray):
-    """Estimates with their intervals over the truth, (run, 6) each; at most 200 runs are drawn."""
-    figure, grid = plt.subplots(2, 3, figsize=(11, 6.6))
-    pick = slice(None, 200)
+def residuals_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, truth: np.ndarray):
+    """Estimates less the truth with their intervals, over the truth, (run, 6) each; at most 100 runs are drawn."""
+    figure, grid = plt.subplots(2, 3, figsize=(11, 6))
+    pick = slice(None, 100)
     for j, axes in enumerate(grid.flat):
         t, v = truth[pick, j], value[pick, j]
+        missed = (t < low[pick, j]) | (t > high[pick, j])
         bars = np.stack([v - low[pick, j], high[pick, j] - v])
-        axes.errorbar(t, v, yerr=bars, fmt=".", ms=3, lw=0.6, color="#2e86ab", ecolor="#a9cde0")
-        ends = [np.nanmin(t), np.nanmax(t)]
-        axes.plot(ends, ends, color=GREY, lw=0.8, zorder=0)
+        for rows, dot, bar, label in (
+            (~missed, "#2e86ab", "#a9cde0", "interval holds the truth"),
+            (missed, "#d1495b", "#eab4bb", "interval misses it"),
+        ):
+            axes.errorbar(
+                t[rows], (v - t)[rows], yerr=bars[:, rows], fmt=".", ms=4, lw=0.9, color=dot, ecolor=bar, label=label
+            )
+        axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)
         axes.set_title(LABELS[FAULT_NAMES[j]], loc="left")
         axes.set_xlabel("seeded")
-        axes.set_ylabel("identified")
+        axes.set_ylabel("identified less seeded")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
 
 

@@ -54,7 +54,7 @@ def coefficient_over_ratio(
         ends, k + dR * ends, color=PHASE_COLOURS[0], label=rf"slope $\Delta R$ = {dR:.4f} $\Omega$, $k$ = {k:.5f}"
     )
     right.axhline(k0, color=GREY, ls=":", lw=1, label=f"nominal $k_0$ = {k0}")
-    right.set_xlabel(r"$|i_a/\omega|$ (A s/rad)")
+    right.set_xlabel(r"$\mathrm{sign}(k'_a)\; i_a/\omega$ (A s/rad)")
     right.set_ylabel(r"$|k'_a|$ (V s/rad)")
     right.legend(loc="best", fontsize=9)
     return figure
@@ -63,11 +63,11 @@ def coefficient_over_ratio(
 def signal_by_fault(
     time: np.ndarray, signal: np.ndarray, labels: Sequence[str], ylabel: str, windows: Sequence[tuple[float, float]]
 ):
-    """Figures 6 and 7: one phase's current or voltage for different fault conditions, at the start and in motion.
+    """Figures 6 and 7: phase currents or voltages for different fault conditions, at the start and in motion.
 
     Parameters
     ----------
-    time, signal : (time,) s and (run, time)
+    time, signal : (time,) s and (run, time, phase)
     windows : (from, to) s of each column
     """
     size = (10.5, 1.65 * len(labels) + 0.5)
@@ -75,12 +75,16 @@ def signal_by_fault(
     for row, label in enumerate(labels):
         for column, (low, high) in enumerate(windows):
             part = (time >= low) & (time <= high)
-            axes[row, column].plot(1e3 * time[part], signal[row, part], lw=0.8, color=PHASE_COLOURS[row % 3])
+            for j, letter in enumerate("abc"):
+                axes[row, column].plot(
+                    1e3 * time[part], signal[row, part, j], lw=0.8, color=PHASE_COLOURS[j], label=f"phase {letter}"
+                )
             axes[row, column].margins(x=0)
         axes[row, 0].set_title(label, fontsize=9, loc="left", pad=3)
         axes[row, 0].set_ylabel(ylabel)
     for axis in axes[-1]:
         axis.set_xlabel("time (ms)")
+    axes[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8, borderaxespad=0.2)
     return figure
 
 
@@ -104,5 +108,5 @@ def few_row_errors(errors: np.ndarray, width: np.ndarray, title: str):
     axes.set_ylabel("absolute error over range")
     axes.set_ylim(0.0)
     axes.set_title(title, fontsize=10, loc="left")
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper right")
     return figure

@@ -62,8 +62,8 @@ def simulate_examples(spec: Mapping[str, Any], output: str | Path) -> None:
     data = xr.Dataset(
         {
             "time": ("time", interval * np.arange(1, signals["rotor_speed"].shape[1] + 1), {"units": "s"}),
-            "current": (("condition", "time"), signals["phase_current"][:, :, 0], {"units": "A"}),
-            "voltage": (("condition", "time"), signals["phase_voltage"][:, :, 0], {"units": "V"}),
+            "current": (("condition", "time", "phase"), signals["phase_current"], {"units": "A"}),
+            "voltage": (("condition", "time", "phase"), signals["phase_voltage"], {"units": "V"}),
             "k_prime": ("sample", k_prime, {"units": "V s/rad"}),
             "ratio": ("sample", ratio, {"units": "A s/rad"}),
             "angle": ("sample", angle, {"units": "rad", "long_name": "electrical"}),

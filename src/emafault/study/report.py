@@ -87,9 +87,10 @@ def draw_report(
     key = f"{best['method']}.{best['estimator']}"
     parts = [found[f"{key}.{kind}"] for kind in ("value", "low", "high", "truth")]
     level = table["level"]
-    page.heading("Estimates over truth")
-    text = f"{named(best['method'], best['estimator'])}: fresh runs with {level:.0%} intervals (at most 200 drawn)."
-    page.figure("estimates", error_figures.estimates_over_truth(*parts), text)
+    page.heading("Estimates")
+    label = named(best["method"], best["estimator"])
+    text = f"{label}: what is identified less what was seeded, with {level:.0%} intervals, on 100 fresh runs."
+    page.figure("estimates", error_figures.residuals_over_truth(*parts), text)
     page.heading("What this rests on")
     page.paragraph(CHOICES)
     page.preformatted(Path(configuration).read_text())
@@ -230,11 +231,9 @@ def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.
     windows = [(0.0, min(0.12, end)), (max(0.0, end - 0.06), end)]
     labels = [str(name) for name in shown["condition"].values][1:]
     for number, name, unit in ((6, "current", "A"), (7, "voltage", "V")):
-        drawing = paper_figures.signal_by_fault(time, shown[name].values[1:], labels, f"$i_a$ ({unit})", windows)
-        if name == "voltage":
-            for axes in drawing.axes:
-                axes.set_ylabel(axes.get_ylabel().replace("i_a", "v_a"))
-        text = f"Figure {number}: {name} of phase a for different faults, at the start and at the end of the record."
+        label = f"{name} ({unit})"
+        drawing = paper_figures.signal_by_fault(time, shown[name].values[1:], labels, label, windows)
+        text = f"Figure {number}: phase {name}s for different faults, at the start and at the end of the record."
         page.figure(f"figure_{number}", drawing, text)
     width = np.array([table["width"][name] for name in FAULT_NAMES])
     own = [r for r in table["results"] if r["method"] == "paper" and r["estimator"] == "network"]
