@@ -10,6 +10,7 @@ import pytest
 from emafault.errors import InputError
 from emafault.twins.library import MEASURED, build_twin, distortions, measured_twins, read_cases
 from emafault.twins.measured import MeasuredTwin, mean_variance, smooth_covariance
+from emafault.twins.slow_rotation import find_pole_pairs_and_slots
 
 from .laplace import Fit, rms
 
@@ -328,6 +329,27 @@ def test_bad_arrays_are_refused(tmp_path):
     np.savez(target, a=np.array([{}], dtype=object))
     with pytest.raises(InputError, match="cannot be read"):
         read_cases("induction_currents", target)
+
+
+def test_a_folder_gives_the_files_that_the_twin_reads(tmp_path):
+    cases = read_cases("slow_rotation", DATA / "odrive_cogging")
+    assert set(cases) == {"cogging_maps", "slow_moves"}
+    with pytest.raises(InputError, match="no file that twin"):
+        read_cases("friction_axis", tmp_path)
+    with pytest.raises(InputError, match="is missing"):
+        read_cases("friction_axis", DATA / "odrive_cogging")
+
+
+def test_a_dead_channel_is_refused(tmp_path):
+    values = np.random.default_rng(0).standard_normal((400, 3)) * [1, 1, 0]
+    np.savez(tmp_path / "x.npz", t_a=np.arange(400.0), v_a=values)
+    with pytest.raises(InputError, match="constant"):
+        read_cases("back_emf", tmp_path / "x.npz")
+
+
+def test_noise_has_neither_poles_nor_slots():
+    rng = np.random.default_rng(8)
+    assert all(find_pole_pairs_and_slots(rng.standard_normal(128)) == (7, 12) for _ in range(20))
 
 
 def test_one_recording_leaves_nothing_to_hold_out():

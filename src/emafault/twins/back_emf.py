@@ -52,6 +52,10 @@ def read(path: Path) -> dict[str, Arrays]:
         if arrays[f"v_{name}"].ndim != 2 or arrays[f"v_{name}"].shape[1] != 3:
             raise InputError(f"{path}: 'v_{name}' has shape {arrays[f'v_{name}'].shape}, needed is (samples, 3)")
         require_finite(path, arrays, (f"t_{name}", f"v_{name}"), rows=200)
+        if not (np.diff(arrays[f"t_{name}"]) > 0).all():
+            raise InputError(f"{path}: 't_{name}' must rise")
+        if not arrays[f"v_{name}"].std(axis=0).all():
+            raise InputError(f"{path}: 'v_{name}' has a channel that is constant")
     return {Path(path).name.split(".")[0]: {key: v for key, v in arrays.items() if key[2:] in names}}
 
 
@@ -111,10 +115,12 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
     confirm = fast if len(fast) < len(names) else names[-max(1, len(names) // 3) :]
     explore = [name for name in names if name not in confirm]
     c = {name: harmonics(arrays[f"t_{name}"], arrays[f"v_{name}"], f[name]) for name in names}
-    first = c[explore[0]][1]
-    sequence = -np.sign(np.angle(first[1] / first[0]))
     scale = float(np.median([np.abs(c[n][1, 0]) / (2 * np.pi * f[n] / pairs) for n in explore]))
-    blocks = {n: _block(n, arrays, f[n], c[n], 2 * np.pi * f[n] / pairs, sequence) for n in names}
+    for name in names:
+        size = np.abs(c[name][1])
+        if size.min() < 1e-4 * size.max():
+            raise InputError(f"{case}: 'v_{name}' channel {int(np.argmin(size)) + 1} shows no wave at {f[name]:.1f} Hz")
+    blocks = {n: _block(n, arrays, f[n], c[n], 2 * np.pi * f[n] / pairs) for n in names}
     notes = [f"{pairs} pole pairs; speeds " + ", ".join(f"{n} {60 * f[n] / pairs:.1f} 1/min" for n in names)]
     notes += [
         f"{n}: the waveform says {60 * f[n] / pairs:.0f} 1/min, the name {rpm}"
@@ -142,7 +148,7 @@ def relative(c: np.ndarray) -> np.ndarray:
     return out
 
 
-def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, sequence: float) -> Block:
+def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float) -> Block:
     t, v = arrays[f"t_{name}"], arrays[f"v_{name}"]
     # scatter between stretches of whole electrical periods is the repeatability of each coefficient
     periods = int(f * (t[-1] - t[0]))
@@ -151,6 +157,8 @@ def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float, seq
     stretches = [slice(k * length, (k + 1) * length) for k in range(parts)]
     pieces = np.stack([relative(harmonics(t[s], v[s], f)) for s in stretches])
     values = relative(c)
+    # the phase that follows a third of a turn behind the first
+    sequence = -np.sign(np.angle(c[1, 1] / c[1, 0]))
     ideal = np.exp(-2j * np.pi / 3 * sequence * np.arange(3))
     # angles are counted from where the sequence puts each phase, so that none is near half a turn
     values[1].imag = np.angle(np.exp(1j * values[1].imag) / ideal)

@@ -34,7 +34,7 @@ ACCURACY = 0.005  # of the largest value: how far the recorded voltages and torq
 IRON_LOSS = 0.02  # of the apparent power: iron loss that a machine of this kind has
 STEADY = 0.01  # relative change of speed or current between rows above which a row is a transient
 SETTLE = 4  # rows dropped after each transient
-BLOCKS = 40  # statistics blocks per part, at most
+BLOCKS = 80  # pieces that the steady rows are cut into, at least two per condition
 EXPLORE_SHARE = 0.6  # of the steady rows
 
 
@@ -78,7 +78,7 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
         raise InputError(f"{case}: {total} steady rows at speed, at least 60 are needed")
     explore, confirm = _split(stretches, int(EXPLORE_SHARE * total))
     scale = _scales(arrays, np.concatenate(stretches))
-    blocks = {part: _block(part, rows, arrays, scale) for part, rows in (explore | confirm).items()}
+    blocks = {part: _block(part, rows, total, arrays, scale) for part, rows in (explore | confirm).items()}
     parameters = _parameters(scale)
     return MeasuredTwin(
         NAME, case, tuple(explore), tuple(confirm), blocks, parameters, library(parameters, _equations()), _model,
@@ -113,8 +113,8 @@ def _scales(arrays: Arrays, rows: np.ndarray) -> dict[str, float]:
     return {"voltage": voltage, "current": current, "omega": omega, "torque": torque}
 
 
-def _block(part: str, rows: np.ndarray, arrays: Arrays, scale: Mapping[str, float]) -> Block:
-    pieces = np.array_split(rows, min(BLOCKS, max(2, rows.size // 10)))
+def _block(part: str, rows: np.ndarray, total: int, arrays: Arrays, scale: Mapping[str, float]) -> Block:
+    pieces = np.array_split(rows, int(np.clip(BLOCKS * rows.size / total, 2, rows.size // 5)))
     omega = arrays["motor_speed"] * 2 * np.pi / 60
     columns = dict(
         w=omega, i_d=arrays["i_d"], i_q=arrays["i_q"], winding=arrays["stator_winding"] - REFERENCE_TEMPERATURE,

@@ -24,16 +24,32 @@ def _module(name: str):
 
 
 def read_cases(name: str, path: Path) -> dict[str, Arrays]:
-    """Raw arrays of each case (machine or condition) of a file.
+    """Raw arrays of each case (machine or condition) of a file, or of the files of a folder that the twin can read.
 
     Raises
     ------
     InputError
-        when the twin is not known or the file is not what its twin needs.
+        when the twin is not known, the file is not what its twin needs, or no file of the folder is.
     """
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such file")
-    return _module(name).read(Path(path))
+    module, path = _module(name), Path(path)
+    if path.is_file():
+        return module.read(path)
+    if not path.is_dir():
+        raise InputError(f"{path}: no such file or folder")
+    cases: dict[str, Arrays] = {}
+    refused = ""
+    for file in sorted(path.iterdir()):
+        if not file.name.endswith((".npz", ".csv", ".csv.gz")):
+            continue
+        try:
+            found = module.read(file)
+        except InputError as problem:
+            refused = refused or str(problem)
+            continue
+        cases |= {case if case not in cases else f"{file.name}: {case}": arrays for case, arrays in found.items()}
+    if not cases:
+        raise InputError(f"{path}: no file that twin {name!r} reads" + (f" ({refused})" if refused else ""))
+    return cases
 
 
 def build_twin(name: str, case: str, arrays: Arrays) -> MeasuredTwin:

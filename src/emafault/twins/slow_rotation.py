@@ -33,6 +33,7 @@ BINS = 128  # of one turn
 ORDERS = 63  # highest wave per turn that the bins resolve
 COUNTS = 8192  # encoder counts of one turn
 ACCURACY = 0.02  # of the current's rms: friction of the held rotor and position of the samples
+STANDS_OUT = 12.0  # score (log power over noise, less its cost) from which a spectrum tells poles and slots
 CREEP = 0.05  # rad/s over which friction turns with the speed
 SETTLE = 0.5  # s at the start of a move
 
@@ -90,11 +91,14 @@ def _profile(sample: Arrays) -> np.ndarray:
 
 
 def find_pole_pairs_and_slots(profile: np.ndarray) -> tuple[int, int]:
-    """Pole pairs and slots whose multiples carry the spectrum of a map over one turn, each order costing its noise."""
+    """Pole pairs and slots whose multiples carry the spectrum of a map over one turn, each order costing its noise.
+
+    Where nothing stands out of the noise, the usual 7 and 12.
+    """
     power = np.abs(np.fft.rfft(profile))[1 : ORDERS + 1] ** 2
     gain = np.log1p(power / np.median(power)) - 2.0
     order = np.arange(1, ORDERS + 1)
-    best, found = -np.inf, (1, 3)
+    best, found = STANDS_OUT, (7, 12)
     for p in range(2, 22):
         for slots in range(3, 49, 3):
             if slots == 2 * p or slots == p:
@@ -164,6 +168,8 @@ def _block(name: str, sample: Arrays, direction: float | None, size: float) -> B
         "direction": np.array([sample["s"][r].mean() if direction is None else direction for r in rows.values()]),
     }
     variance = np.array([mean_variance(sample["i"][r]) for r in rows.values()])
+    # a handful of samples per bin tells little of its own noise: most of it is taken from all bins
+    variance = 0.2 * variance + 0.8 * variance.mean()
     place = np.array(list(rows)) * width
     covariance = smooth_covariance(place, ACCURACY * size, 2 * width) + np.diag(variance)
     return Block(cells, observed, covariance, inputs)
