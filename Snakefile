@@ -39,4 +39,9 @@ rule datasets:
 rule features:
     """Simulate and reconstruct."""
     input:
-        [path for case in PLAN.cases for path in all_features(case)],
+        [
+            path
+            for case in PLAN.cases
+            for part in case.parts
+            for path in feature_tables(case, part)
+        ],

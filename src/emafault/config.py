@@ -6,6 +6,7 @@ Only this module, the command line and the Snakefile read configuration; everyth
 import ast
 import functools
 import hashlib
+import os
 import shlex
 import shutil
 import tempfile
@@ -47,6 +48,21 @@ def recursively_sorted(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [recursively_sorted(item) for item in value]
     return value
+
+
+def check_writable(folder: str | Path) -> None:
+    """Refuse, before anything runs, results that cannot be written.
+
+    Raises
+    ------
+    InputError : the folder is a file, or is read-only
+    """
+    path = Path(folder)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is not a folder, results cannot be written there")
+    nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: is read-only, results cannot be written there")
 
 
 # --- composition ---------------------------------------------------------------------------------------------------

@@ -1,10 +1,11 @@
 """Progress of long steps, one line every few seconds on the standard error stream."""
 
+import contextlib
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import TextIO, TypeVar
 
 from .errors import InputError
 
@@ -23,15 +24,29 @@ def progress(items: Iterable[T], label: str, total: int, every: float = 3.0) -> 
 
 
 def say(text: str) -> None:
-    """One line on the standard error stream."""
-    print(text, file=sys.stderr, flush=True)
+    """One line on the standard error stream, and in the log of the script that runs."""
+    for stream in (sys.stderr, *_logs):
+        print(text, file=stream, flush=True)
+
+
+_logs: list[TextIO] = []
 
 
 @contextmanager
-def one_line_errors() -> Iterator[None]:
-    """Turn an InputError into one line and exit code 2, for scripts and the command line."""
-    try:
-        yield
-    except InputError as error:
-        say(f"emafault: {error}")
-        raise SystemExit(2) from None
+def one_line_errors(log: str) -> Iterator[None]:
+    """For scripts: keep what is said in a log as well, and turn an InputError into one line and exit code 2."""
+    with contextlib.ExitStack() as stack:
+        try:
+            try:
+                _logs.append(stack.enter_context(open(log, "w")))
+            except OSError as error:
+                raise InputError(f"{log}: cannot be written ({error.strerror})") from error
+            yield
+        except InputError as error:
+            say(f"emafault: {' '.join(str(error).split())}")
+            raise SystemExit(2) from None
+        except OSError as error:  # a disk that is full or a folder that is read-only shows itself anywhere
+            say(f"emafault: {error.filename or 'a file'}: cannot be used ({error.strerror or error})")
+            raise SystemExit(2) from None
+        finally:
+            _logs.clear()

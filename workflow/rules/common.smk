@@ -1,53 +1,63 @@
-# What every rule needs: the composed configuration, where files stand and what digests trigger a rule again.
+# What all of them share: the composed configuration, where files stand, what each stage reads and its sources' digests.
+# Functions of wildcards stand here, in the order of the pipeline; the files beside this one hold only steps.
 import os
 import sys
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from snakemake.exceptions import WorkflowError
-
 from emafault import config as configuration
 from emafault.errors import InputError
 
 RESULTS = "results"
-SCRIPTS = workflow.basedir + "/workflow/scripts"
 
 try:
     PLAN = configuration.plan(
         config.get("experiment", "paper"), config.get("overrides", "")
     )
+    configuration.check_writable(RESULTS)
 except InputError as error:
     sys.exit(f"emafault: {error}")
 
 EXPERIMENT = f"{RESULTS}/experiments/{PLAN.name}"
-DATASETS = sorted({name for case in PLAN.cases for name in case.datasets.values()})
-WORKERS = max(case.config["search"]["workers"] for case in PLAN.cases)
+CASE = f"{RESULTS}/experiments/{{case}}"
 
 
 wildcard_constraints:
     case="|".join(case.path for case in PLAN.cases),
-    dataset="|".join(DATASETS),
+    dataset="|".join(
+        sorted({name for case in PLAN.cases for name in case.datasets.values()})
+    ),
     part="|".join(configuration.PARTS),
-    shard=r"\d+",
     method="|".join(
         sorted({name for case in PLAN.cases for name in case.config["reconstruction"]})
     ),
     estimator="closed_form|network|searched",
+    shard=r"\d+",
     worker=r"\d+",
 
 
 def code(script):
-    """Digest of a rule's script and of everything of the package that it imports."""
-    return configuration.source_digest(f"{SCRIPTS}/{script}.py")
+    """Digest of a script and of everything of the package that it imports."""
+    return configuration.source_digest(
+        f"{workflow.basedir}/workflow/scripts/{script}.py"
+    )
 
 
-def case_of(wildcards):
-    return PLAN.case(wildcards.case)
+def composed(wildcards):
+    """Configuration of a case."""
+    return PLAN.case(wildcards.case).config
 
 
 def case_files(name):
     """One file of every case."""
     return [f"{RESULTS}/experiments/{case.path}/{name}" for case in PLAN.cases]
+
+
+# --- datasets and features ---
+
+
+def dataset_spec(wildcards):
+    return PLAN.dataset(wildcards.dataset, wildcards.part)
 
 
 def shards(case, part):
@@ -59,18 +69,125 @@ def shards(case, part):
     ]
 
 
-def all_features(case):
-    """Every table of features of a case."""
+def shards_of_part(wildcards):
+    return shards(PLAN.case(wildcards.case), wildcards.part)
+
+
+def feature_tables(case, part):
+    """The tables of features of one part of a case, by every method."""
     folder = f"{RESULTS}/experiments/{case.path}/features"
     return [
         f"{folder}/{part}_{method}.nc"
-        for part in case.parts
         for method in case.config["reconstruction"]
+        if part in case.parts
     ]
 
 
-def estimators(case, method):
-    """The estimators trained on one method's features."""
-    search = case.config["search"]
-    searched = search["trials"] > 0 and search["reconstruction"] == method
-    return ["closed_form", "network", *(["searched"] if searched else [])]
+def reconstruction_spec(wildcards):
+    return configuration.reconstruction_spec(composed(wildcards), wildcards.method)
+
+
+def bound_spec(wildcards):
+    return configuration.bound_spec(composed(wildcards))
+
+
+# --- identification ---
+
+
+def training_features(wildcards):
+    """Features that are trained on: of the method asked for, else of the one that is searched on."""
+    method = wildcards.get("method", composed(wildcards)["search"]["reconstruction"])
+    return f"{RESULTS}/experiments/{wildcards.case}/features/training_{method}.nc"
+
+
+def training_spec(wildcards):
+    return configuration.network_spec(composed(wildcards), wildcards.estimator)
+
+
+def search_spec(wildcards):
+    return configuration.search_spec(composed(wildcards))
+
+
+def search_storage(wildcards):
+    own = f"{RESULTS}/experiments/{wildcards.case}/search/journal.log"
+    return composed(wildcards)["search"]["storage"] or own
+
+
+def searching_workers(wildcards):
+    number = composed(wildcards)["search"]["workers"]
+    return [
+        f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json"
+        for worker in range(number)
+    ]
+
+
+def search_results(wildcards):
+    names = ("trials", "chosen") if composed(wildcards)["search"]["trials"] else ()
+    return [
+        f"{RESULTS}/experiments/{wildcards.case}/search/{name}.json" for name in names
+    ]
+
+
+def chosen_network(wildcards):
+    """What the search found, for the estimator that is trained from it."""
+    return search_results(wildcards)[1:] if wildcards.estimator == "searched" else []
+
+
+def histories(wildcards):
+    """One file of every trained estimator of a case."""
+    search = composed(wildcards)["search"]
+    searched = search["reconstruction"] if search["trials"] else None
+    names = [
+        f"{method}/{estimator}"
+        for method in composed(wildcards)["reconstruction"]
+        for estimator in (
+            "closed_form",
+            "network",
+            *(["searched"] if method == searched else []),
+        )
+    ]
+    return [
+        f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}/history.json"
+        for name in names
+    ]
+
+
+def exported_network(wildcards):
+    """The network worth embedding: the searched one, else that of the last method."""
+    networks = [path for path in histories(wildcards) if "closed_form" not in path]
+    return ([path for path in networks if "identifiers/paper" not in path] or networks)[
+        -1:
+    ]
+
+
+def exported_features(wildcards):
+    """Fresh features of the method that the exported network reads."""
+    method = exported_network(wildcards)[0].split("identifiers/")[1].split(os.sep)[0]
+    return f"{RESULTS}/experiments/{wildcards.case}/features/fresh_{method}.nc"
+
+
+def evaluation_spec(wildcards):
+    return configuration.evaluation_spec(composed(wildcards))
+
+
+def fresh_features(wildcards):
+    return feature_tables(PLAN.case(wildcards.case), "fresh")
+
+
+def reference_features(wildcards):
+    return feature_tables(PLAN.case(wildcards.case), "reference")
+
+
+# --- report ---
+
+
+def examples_spec(wildcards):
+    return configuration.examples_spec(composed(wildcards))
+
+
+def whole_configuration(wildcards):
+    return configuration.recursively_sorted(composed(wildcards))
+
+
+def title_and_question(wildcards):
+    return {"title": wildcards.case, "question": composed(wildcards)["question"]}

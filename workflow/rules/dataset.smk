@@ -1,14 +1,12 @@
 # Fault vectors are sampled, runs simulated and measured, and written in shards.
 
 
-def dataset_spec(wildcards):
-    return PLAN.dataset(wildcards.dataset, wildcards.part)
-
-
 # It carries the digest of the simulation itself: what is compiled anew is simulated anew.
 rule compile_simulation:
     output:
         f"{RESULTS}/compiled.txt",
+    log:
+        f"{RESULTS}/logs/compile_simulation.log",
     resources:
         mem_mb=2000,
         runtime=10,
@@ -24,6 +22,8 @@ rule simulate_shard:
         rules.compile_simulation.output,
     output:
         f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
+    log:
+        f"{RESULTS}/logs/{{dataset}}/simulate_{{part}}_{{shard}}.log",
     resources:
         mem_mb=1000,
         runtime=60,

@@ -1,80 +1,4 @@
 # Estimators are trained, searched for, exported and evaluated.
-CASE = f"{RESULTS}/experiments/{{case}}"
-
-
-def training_features(wildcards):
-    method = (
-        getattr(wildcards, "method", None)
-        or case_of(wildcards).config["search"]["reconstruction"]
-    )
-    return f"{RESULTS}/experiments/{wildcards.case}/features/training_{method}.nc"
-
-
-def chosen_network(wildcards):
-    return (
-        f"{RESULTS}/experiments/{wildcards.case}/search/chosen.json"
-        if wildcards.estimator == "searched"
-        else []
-    )
-
-
-def training_spec(wildcards):
-    return configuration.network_spec(case_of(wildcards).config, wildcards.estimator)
-
-
-def search_spec(wildcards):
-    return configuration.search_spec(case_of(wildcards).config)
-
-
-def search_storage(wildcards):
-    own = f"{RESULTS}/experiments/{wildcards.case}/search/journal.log"
-    return case_of(wildcards).config["search"]["storage"] or own
-
-
-def searching_workers(wildcards):
-    number = case_of(wildcards).config["search"]["workers"]
-    return [
-        f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json"
-        for worker in range(number)
-    ]
-
-
-def histories(wildcards):
-    case = case_of(wildcards)
-    folder = f"{RESULTS}/experiments/{case.path}/identifiers"
-    methods = case.config["reconstruction"]
-    return [
-        f"{folder}/{method}/{name}/history.json"
-        for method in methods
-        for name in estimators(case, method)
-    ]
-
-
-def features_of(part):
-    def paths(wildcards):
-        case = case_of(wildcards)
-        return [
-            path
-            for path in all_features(case)
-            if path.split("/")[-1].startswith(f"{part}_")
-        ]
-
-    return paths
-
-
-def exported_identifier(wildcards):
-    case = case_of(wildcards)
-    search = case.config["search"]
-    methods = list(case.config["reconstruction"])
-    method = (
-        search["reconstruction"] if search["reconstruction"] in methods else methods[-1]
-    )
-    estimator = "searched" if search["trials"] else "network"
-    return f"{RESULTS}/experiments/{case.path}/identifiers/{method}/{estimator}/history.json"
-
-
-def evaluation_spec(wildcards):
-    return configuration.evaluation_spec(case_of(wildcards).config)
 
 
 rule search_network:
@@ -82,6 +6,8 @@ rule search_network:
         training_features,
     output:
         f"{CASE}/search/worker_{{worker}}.json",
+    log:
+        f"{RESULTS}/logs/{{case}}/search_{{worker}}.log",
     resources:
         mem_mb=2000,
         runtime=240,
@@ -100,6 +26,8 @@ rule choose_network:
     output:
         trials=f"{CASE}/search/trials.json",
         chosen=f"{CASE}/search/chosen.json",
+    log:
+        f"{RESULTS}/logs/{{case}}/choose_network.log",
     resources:
         mem_mb=2000,
         runtime=10,
@@ -117,6 +45,8 @@ rule train_identifier:
         chosen=chosen_network,
     output:
         f"{CASE}/identifiers/{{method}}/{{estimator}}/history.json",
+    log:
+        f"{RESULTS}/logs/{{case}}/train_{{method}}_{{estimator}}.log",
     resources:
         mem_mb=2000,
         runtime=60,
@@ -129,11 +59,13 @@ rule train_identifier:
 
 rule export_network:
     input:
-        features=rules.train_identifier.input.features,
-        history=exported_identifier,
+        features=exported_features,
+        history=exported_network,
     output:
         model=f"{CASE}/export/network.onnx",
         check=f"{CASE}/export/check.json",
+    log:
+        f"{RESULTS}/logs/{{case}}/export_network.log",
     resources:
         mem_mb=2000,
         runtime=10,
@@ -146,12 +78,14 @@ rule export_network:
 rule evaluate_identification:
     input:
         histories=histories,
-        fresh=features_of("fresh"),
-        references=features_of("reference"),
+        fresh=fresh_features,
+        references=reference_features,
         bound=rules.compute_bound.output,
     output:
         metrics=f"{CASE}/evaluation/metrics.json",
         estimates=f"{CASE}/evaluation/estimates.nc",
+    log:
+        f"{RESULTS}/logs/{{case}}/evaluate_identification.log",
     resources:
         mem_mb=2000,
         runtime=30,

@@ -1,25 +1,13 @@
-# Resistances and back-EMF coefficients are reconstructed from each run, and bounded from below.
-
-
-def shards_of_part(wildcards):
-    return shards(case_of(wildcards), wildcards.part)
-
-
-def reconstruction_spec(wildcards):
-    return configuration.reconstruction_spec(
-        case_of(wildcards).config, wildcards.method
-    )
-
-
-def bound_spec(wildcards):
-    return configuration.bound_spec(case_of(wildcards).config)
+# Resistances and back-EMF coefficients are reconstructed from each run; their accuracy is bounded from below.
 
 
 rule reconstruct_features:
     input:
         shards_of_part,
     output:
-        f"{RESULTS}/experiments/{{case}}/features/{{part}}_{{method}}.nc",
+        f"{CASE}/features/{{part}}_{{method}}.nc",
+    log:
+        f"{RESULTS}/logs/{{case}}/reconstruct_{{part}}_{{method}}.log",
     resources:
         mem_mb=2000,
         runtime=60,
@@ -34,7 +22,9 @@ rule compute_bound:
     input:
         rules.compile_simulation.output,
     output:
-        f"{RESULTS}/experiments/{{case}}/bound.nc",
+        f"{CASE}/bound.nc",
+    log:
+        f"{RESULTS}/logs/{{case}}/compute_bound.log",
     resources:
         mem_mb=2000,
         runtime=60,

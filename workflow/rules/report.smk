@@ -1,29 +1,11 @@
 # The resolved configuration is written down, figures are drawn, everything is tracked.
 
 
-def examples_spec(wildcards):
-    return configuration.examples_spec(case_of(wildcards).config)
-
-
-def whole_configuration(wildcards):
-    return configuration.recursively_sorted(case_of(wildcards).config)
-
-
-def title_and_question(wildcards):
-    return {"title": wildcards.case, "question": case_of(wildcards).config["question"]}
-
-
-def search_results(wildcards):
-    trials = case_of(wildcards).config["search"]["trials"]
-    names = ("trials", "chosen") if trials else ()
-    return [
-        f"{RESULTS}/experiments/{wildcards.case}/search/{name}.json" for name in names
-    ]
-
-
 rule write_configuration:
     output:
         f"{CASE}/configuration.yaml",
+    log:
+        f"{RESULTS}/logs/{{case}}/write_configuration.log",
     localrule: True
     params:
         spec=whole_configuration,
@@ -37,6 +19,8 @@ rule simulate_examples:
         rules.compile_simulation.output,
     output:
         f"{CASE}/examples.nc",
+    log:
+        f"{RESULTS}/logs/{{case}}/simulate_examples.log",
     resources:
         mem_mb=1000,
         runtime=10,
@@ -58,6 +42,8 @@ rule draw_report:
     output:
         report=f"{CASE}/report.html",
         figures=directory(f"{CASE}/figures"),
+    log:
+        f"{RESULTS}/logs/{{case}}/draw_report.log",
     resources:
         mem_mb=2000,
         runtime=10,
@@ -76,6 +62,8 @@ if PLAN.is_study:
         output:
             report=f"{EXPERIMENT}/report.html",
             figures=directory(f"{EXPERIMENT}/figures"),
+        log:
+            f"{RESULTS}/logs/{PLAN.name}/compare_variants.log",
         resources:
             mem_mb=1000,
             runtime=10,
@@ -94,6 +82,8 @@ if PLAN.is_study:
 rule prepare_tracking:
     output:
         f"{RESULTS}/tracking.json",
+    log:
+        f"{RESULTS}/logs/prepare_tracking.log",
     localrule: True
     resources:
         tracking=1,
@@ -118,6 +108,8 @@ rule track_evaluation:
         configuration=rules.write_configuration.output,
     output:
         f"{CASE}/tracked.json",
+    log:
+        f"{RESULTS}/logs/{{case}}/track_evaluation.log",
     localrule: True
     resources:
         tracking=1,

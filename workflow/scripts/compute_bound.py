@@ -3,5 +3,5 @@
 from emafault.progress import one_line_errors
 from emafault.study.features import compute_bound
 
-with one_line_errors():
+with one_line_errors(snakemake.log[0]):
     compute_bound(snakemake.params.spec, snakemake.output[0])

@@ -3,7 +3,7 @@
 from emafault.progress import one_line_errors
 from emafault.study.report import draw_report
 
-with one_line_errors():
+with one_line_errors(snakemake.log[0]):
     given, spec = snakemake.input, snakemake.params.spec
     draw_report(
         spec["title"],

@@ -3,7 +3,7 @@
 from emafault.progress import one_line_errors
 from emafault.study.evaluation import evaluate_identification
 
-with one_line_errors():
+with one_line_errors(snakemake.log[0]):
     given, out = snakemake.input, snakemake.output
     evaluate_identification(
         given.histories,

@@ -3,7 +3,7 @@
 from emafault.progress import one_line_errors
 from emafault.study.tracked import track_evaluation
 
-with one_line_errors():
+with one_line_errors(snakemake.log[0]):
     given = snakemake.input
     files = {given.model: "model", given.report: "", given.figures: "figures", given.configuration[0]: ""}
     track_evaluation(

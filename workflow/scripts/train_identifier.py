@@ -3,8 +3,8 @@
 from emafault.progress import one_line_errors
 from emafault.study.networks import train_identifier
 
-with one_line_errors():
-    chosen = snakemake.input.chosen or None
+with one_line_errors(snakemake.log[0]):
+    chosen = snakemake.input.chosen[0] if snakemake.input.chosen else None
     train_identifier(
         snakemake.wildcards.estimator, snakemake.input.features, snakemake.params.spec, snakemake.output[0], chosen
     )
