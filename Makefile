@@ -1,0 +1,27 @@
+# make study   runs the default study (experiment=NAME and overrides="..." choose another)
+# make test    runs the tests
+# Both set everything up in .venv first, which needs Python 3.11 and git.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+CORES ?= all
+experiment ?= paper
+overrides ?=
+
+BIN := $(CURDIR)/.venv/bin
+export PATH := $(BIN):$(PATH)
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+
+.PHONY: study test
+
+study: .venv/ready
+	snakemake --cores $(CORES) --config experiment=$(experiment) "overrides=$(overrides)"
+
+test: .venv/ready
+	python -m pytest
+
+.venv/ready: requirements.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, PYTHON=... names one") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv .venv
+	pip install --quiet --disable-pip-version-check -r requirements.txt
+	touch $@
