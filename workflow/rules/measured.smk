@@ -4,12 +4,20 @@ MEASURED = "data/measured"
 
 rule diagnose_measured:
     input:
-        f"{MEASURED}/sets.yaml",
+        sets=f"{MEASURED}/sets.yaml",
+        nameplate=f"{MEASURED}/nameplate.yaml",
+        files=[
+            f"{MEASURED}/{path}"
+            for path in glob_wildcards(f"{MEASURED}/{{path}}").path
+            if path.endswith((".npz", ".csv.gz"))
+        ],
     output:
         report=f"{RESULTS}/measured/report.html",
         figures=directory(f"{RESULTS}/measured/figures"),
         verdicts=f"{RESULTS}/measured/verdicts.json",
         withheld=f"{RESULTS}/measured/withheld.json",
+    log:
+        f"{RESULTS}/logs/measured/diagnose_measured.log",
     resources:
         mem_mb=1000,
         runtime=10,
