@@ -4,6 +4,7 @@ Only this module, the command line and the Snakefile read configuration; everyth
 """
 
 import ast
+import fcntl
 import functools
 import hashlib
 import os
@@ -13,7 +14,7 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from omegaconf import OmegaConf
 
@@ -63,6 +64,25 @@ def check_writable(folder: str | Path) -> None:
     nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
     if not os.access(nearest, os.W_OK | os.X_OK):
         raise InputError(f"{path}: is read-only, results cannot be written there")
+
+
+_claims: list[IO[str]] = []  # held as long as the process lives
+
+
+def claim(folder: str | Path) -> None:
+    """Claim a folder of results for this process; a killed process leaves no claim behind, unlike a lock file.
+
+    Raises
+    ------
+    InputError : another process is at work there
+    """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    file = open(Path(folder) / ".lock", "w")
+    _claims.append(file)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{folder}: another run is at work there, wait until it has ended") from None
 
 
 # --- composition ---------------------------------------------------------------------------------------------------

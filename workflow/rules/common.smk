@@ -53,6 +53,13 @@ def case_files(name):
     return [f"{RESULTS}/experiments/{case.path}/{name}" for case in PLAN.cases]
 
 
+onstart:
+    try:
+        configuration.claim(RESULTS)
+    except InputError as error:
+        sys.exit(f"emafault: {error}")
+
+
 # --- datasets and features ---
 
 
