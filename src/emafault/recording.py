@@ -4,6 +4,7 @@ Reading and writing live here together. Arrays in memory have the phase as their
 it leads, (phase, time).
 """
 
+import contextlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -75,7 +76,8 @@ def replace_atomically(path: Path, write) -> None:
     except RuntimeError as error:  # how the netCDF library reports a full disk
         raise InputError(f"{path}: cannot be written ({error})") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # nothing to remove where nothing could be written
+            temporary.unlink(missing_ok=True)
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:

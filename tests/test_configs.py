@@ -1,0 +1,162 @@
+"""Every experiment composes; what does not fit is refused in one line that names the key, the value and what is accepted."""
+
+import pytest
+
+from emafault import config
+from emafault.errors import InputError
+
+
+@pytest.mark.parametrize("experiment", config.experiments())
+def test_every_experiment_composes(experiment):
+    plan = config.plan(experiment)
+    assert plan.name == experiment and plan.question
+    assert plan.is_study == (len(plan.cases) > 1)
+    for case in plan.cases:
+        for part in case.parts:
+            assert plan.dataset(case.datasets[part], part) == config.dataset_spec(case.config, part)
+
+
+@pytest.mark.parametrize("group", config.GROUPS)
+def test_every_option_of_a_group_composes(group, tmp_path):
+    command = tmp_path / "command.csv"
+    command.write_text("0 0\n1 0.1\n")
+    for path in (config.CONF / group).glob("*.yaml"):
+        extra = [f"command.path={command}"] if path.stem == "file" else []
+        chosen = f"{group}=[{path.stem}]" if group == "reconstruction" else f"{group}={path.stem}"
+        extra += ["search=none"] if group == "reconstruction" else []
+        assert config.compose("paper", [chosen, *extra])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        ("faults.dT.hig=90", ("faults.dT.hig", "high", "low")),
+        ("faults.dT.high=warm", ("faults.dT.high", "'warm'", "from -200 to 500 (K)")),
+        ("faults.dT.low=100", ("faults.dT.high", "70.0", "faults.dT.low = 100")),
+        ("command=fast", ("command", "'fast'", "parabolic", "sine")),
+        ("command=sine command.frequency=-1", ("command.frequency", "-1", "above 0")),
+        ("command=file command.path=nowhere.csv", ("command.path", "nowhere.csv", "existing file")),
+        ("sampling.runs=1.5", ("sampling.runs", "1.5", "integer")),
+        ("sampling.runs=true", ("sampling.runs", "True", "integer")),
+        ("actuator.inertia=-1", ("actuator.inertia", "-1", "above 0")),
+        ("effects.stribek.a=0.1", ("effects.stribek", "did you mean stribeck")),
+        ("effects.stribeck.b=0.1", ("effects.stribeck.b", "a, w_s")),
+        ("+new.key=1", ("new", "actuator", "training")),
+        ("name=../elsewhere", ("name", "'../elsewhere'", "letters")),
+        ("recording.duration=1.00005", ("recording.duration", "1.00005", "whole number")),
+        ("faults.dT.high=choice(1,2)", ("faults.dT.high", "sweep", "one value")),
+        ("experiment=smoke", ("experiment", "chosen by itself")),
+        ("reconstruction.paper.threshold=-1", ("reconstruction.paper.threshold", "-1", "from 0")),
+        ("'", ("overrides", "quotation")),
+    ],
+)
+def test_refusals_name_key_value_and_what_is_accepted(overrides, says):
+    with pytest.raises(InputError) as refused:
+        config.plan("paper", overrides)
+    message = str(refused.value)
+    assert "\n" not in message
+    for word in says:
+        assert word in message
+
+
+def test_unknown_experiment_lists_those_there_are():
+    with pytest.raises(InputError, match="got 'nothing'.*paper.*smoke"):
+        config.plan("nothing")
+
+
+def _specs(overrides):
+    composed = config.compose("paper", overrides)
+    return {
+        "dataset": config.dataset_spec(composed, "training"),
+        "fresh": config.dataset_spec(composed, "fresh"),
+        "features": config.reconstruction_spec(composed, "weighted"),
+        "network": config.network_spec(composed, "network"),
+        "closed_form": config.network_spec(composed, "closed_form"),
+        "search": config.search_spec(composed),
+        "evaluation": config.evaluation_spec(composed),
+    }
+
+
+@pytest.mark.parametrize(
+    ("overrides", "changed"),
+    [
+        (["network.width=8"], {"network", "search"}),
+        (["training.epochs=10"], {"network", "search"}),
+        (["evaluation.level=0.8"], {"evaluation"}),
+        (["reconstruction.weighted.margin=4"], {"features"}),
+        (["command=sine"], {"dataset", "fresh"}),
+        (["sampling.fresh=500"], {"fresh"}),
+        (["search.workers=4"], set()),
+        (["tracking.experiment=other"], set()),
+    ],
+)
+def test_an_override_reaches_only_the_stages_that_read_it(overrides, changed):
+    before, after = _specs([]), _specs(overrides)
+    assert {stage for stage in before if before[stage] != after[stage]} == changed
+
+
+def test_specs_are_plain_and_sorted():
+    def check(value):
+        assert type(value) in (dict, list, str, int, float, bool, type(None))
+        if isinstance(value, dict):
+            assert list(value) == sorted(value)
+        for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+            check(item)
+
+    for spec in _specs([]).values():
+        check(spec)
+
+
+def test_magnet_and_load_become_effects_that_an_explicit_effect_overrules():
+    composed = config.compose("magnet_smco", ["load=spring", "effects.magnet_temperature.alpha_m=-1e-3"])
+    assert config.all_effects(composed) == {"magnet_temperature": {"alpha_m": -1e-3}, "load_spring": {"c": 100.0}}
+    assert config.magnet_coefficient(composed) == -1e-3
+
+
+def test_equal_datasets_are_shared_and_others_are_not():
+    (tolerance,) = config.plan("unit_tolerance").cases
+    assert tolerance.datasets == {"training": "paper", "fresh": "unit_tolerance", "reference": "unit_tolerance"}
+    (own,) = config.plan("paper", "name=mine training.epochs=10").cases
+    assert own.path == "mine" and set(own.datasets.values()) == {"paper"}
+    (other,) = config.plan("paper", "name=mine command=sine").cases
+    assert set(other.datasets.values()) == {"mine"}
+
+
+def test_an_experiment_can_be_a_file_of_ones_own(tmp_path):
+    path = tmp_path / "diagnosed.yaml"
+    path.write_text("# @package _global_\neffects:\n  stribeck: {a: 0.01, w_s: 4.0}\n")
+    plan = config.plan(str(path), "sampling.runs=100")
+    assert plan.name == "diagnosed"
+    assert config.all_effects(plan.cases[0].config) == {"stribeck": {"a": 0.01, "w_s": 4.0}}
+    path.write_text("# @package _global_\neffects:\n  stribeck: {c: 0.01}\n")
+    config._compose.cache_clear()
+    with pytest.raises(InputError, match=r"effects\.stribeck\.c"):
+        config.plan(str(path), "sampling.runs=100")
+
+
+def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_path, monkeypatch):
+    package = tmp_path / "emafault"
+    (package / "part").mkdir(parents=True)
+    for name, text in {
+        "__init__.py": "",
+        "used.py": '"""Docs."""\nfrom .part import inner\n',
+        "unused.py": "x = 1\n",
+        "part/__init__.py": "",
+        "part/inner.py": "y = 1\n",
+    }.items():
+        (package / name).write_text(text)
+    script = tmp_path / "script.py"
+    script.write_text("def run():\n    from emafault import used\n")
+    monkeypatch.setattr(config, "PACKAGE", package)
+
+    def digest():
+        config.source_digest.cache_clear()
+        return config.source_digest(script)
+
+    first = digest()
+    (package / "unused.py").write_text("x = 2\n")
+    (package / "used.py").write_text('"""Other docs."""\n# a comment\nfrom .part import inner\n')
+    assert digest() == first
+    (package / "part" / "inner.py").write_text("y = 2\n")
+    assert digest() != first
+    config.source_digest.cache_clear()

@@ -1,0 +1,111 @@
+"""Datasets: the same numbers however they are shared out, readable run by run, refused in one line when damaged."""
+
+import netCDF4
+import numpy as np
+import pytest
+
+from emafault import config, dataset
+from emafault.errors import InputError
+from emafault.study.features import read_features
+
+RUNS = 11
+
+
+def _spec(**changes):
+    composed = config.compose("smoke", ["recording.duration=0.3", "recording.interval=0.001", f"sampling.fresh={RUNS}"])
+    return config.dataset_spec(composed, "fresh") | {"runs": RUNS} | changes
+
+
+def _write(folder, spec):
+    paths = []
+    for shard in range(spec["shards"]):
+        paths.append(folder / f"{spec['shards']}" / f"shard_{shard}.nc")
+        dataset.simulate_shard(paths[-1], spec, shard)
+    return paths
+
+
+def _join(paths):
+    blocks = list(dataset.read_blocks(paths))
+    assert [block.first_run for block in blocks] == list(np.cumsum([0, *(len(b.faults) for b in blocks)])[:-1])
+    names = blocks[0].signals
+    return {name: np.concatenate([b.signals[name] for b in blocks]) for name in names} | {
+        "fault": np.concatenate([b.faults for b in blocks])
+    }
+
+
+def test_sharding_does_not_change_a_bit(tmp_path):
+    one, three = _join(_write(tmp_path, _spec(shards=1))), _join(_write(tmp_path, _spec(shards=3)))
+    assert len(one["fault"]) == RUNS
+    for name, values in one.items():
+        assert np.array_equal(values, three[name]), name
+
+
+def test_block_size_does_not_change_a_bit(tmp_path, monkeypatch):
+    one = _join(_write(tmp_path / "a", _spec(shards=1)))
+    monkeypatch.setattr(dataset, "BLOCK", 4)
+    four = _join(_write(tmp_path / "b", _spec(shards=1)))
+    for name, values in one.items():
+        assert np.array_equal(values, four[name]), name
+
+
+def test_layout_units_and_configuration(tmp_path):
+    (path,) = _write(tmp_path, _spec(shards=1))
+    with netCDF4.Dataset(path) as file:
+        voltage = file["phase_voltage"]
+        assert voltage.dimensions == ("run", "phase", "time") and voltage.units == "V" and voltage.dtype == np.float32
+        assert voltage.chunking() == [1, 3, 300] and voltage.filters()["zlib"] and voltage.filters()["shuffle"]
+        assert file["rotor_speed"].units == "rad/s"
+        assert '"duration": 0.3' in file.configuration and "emafault" in file.software
+    assert not list(path.parent.glob(".*"))
+
+
+def test_one_run_is_read_alone_as_a_recording(tmp_path):
+    paths = _write(tmp_path, _spec(shards=3))
+    every = _join(paths)
+    recording = dataset.read_run(paths, 7)
+    assert np.array_equal(recording.fault, every["fault"][7])
+    assert np.array_equal(recording.phase_current, every["phase_current"][7])
+    with pytest.raises(InputError, match="no such run"):
+        dataset.read_run(paths, RUNS)
+
+
+def test_units_of_a_reference_are_those_of_the_fresh_part():
+    spec = config.compose("unit_tolerance", ["unit.reference_recordings=2", "sampling.fresh=20"])
+    fresh, _ = dataset.sample_runs(config.dataset_spec(spec, "fresh"))
+    reference, faults = dataset.sample_runs(config.dataset_spec(spec, "reference"))
+    assert np.all(faults[:, :5] == 0.0) and len(np.unique(faults[:, 5])) == 40
+    assert np.array_equal(reference["unit_calibration_R_scale"], np.repeat(fresh["unit_calibration_R_scale"], 2))
+    assert 0.003 < np.std(fresh["unit_calibration_R_scale"]) < 0.03
+
+
+def test_magnets_lag_by_the_configured_range():
+    spec = config.dataset_spec(config.compose("magnet_lagging"), "training")
+    runs, _ = dataset.sample_runs(spec)
+    lag = runs["dT"] - runs["dT_magnet"]
+    assert 0.0 <= lag.min() < 2.0 and 38.0 < lag.max() <= 40.0
+    assert np.all(runs["magnet_temperature_alpha_m"] == -4e-4)
+
+
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign", "missing"])
+@pytest.mark.parametrize("reader", [lambda path: list(dataset.read_blocks([path])), read_features])
+def test_damaged_files_are_refused_in_one_line(tmp_path, damage, reader):
+    path = tmp_path / "shard_0.nc"
+    if damage == "truncated":
+        (good,) = _write(tmp_path, _spec(shards=1))
+        path.write_bytes(good.read_bytes()[: good.stat().st_size // 2])
+    elif damage == "garbage":
+        path.write_text("not netCDF")
+    elif damage == "foreign":
+        with netCDF4.Dataset(path, "w") as file:
+            file.createDimension("x", 3)
+            file.createVariable("temperature", "f8", ("x",))[:] = 1.0
+    with pytest.raises(InputError) as refused:
+        reader(path)
+    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_and_nothing_is_left(tmp_path):
+    (tmp_path / "blocked").write_text("a file where a folder should be")
+    with pytest.raises(InputError, match="cannot be written"):
+        dataset.simulate_shard(tmp_path / "blocked" / "shard_0.nc", _spec(shards=1), 0)
+    assert [p.name for p in tmp_path.iterdir()] == ["blocked"]
