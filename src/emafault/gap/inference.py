@@ -14,6 +14,10 @@ from scipy.linalg import solve_triangular
 from .twin import Hypothesis, Parameter, Twin
 
 
+#: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
+NEAR = 20.0
+
+
 @dataclass(frozen=True)
 class Point:
     """A fitted parameter point: values (parameter,), prediction (statistic,), objective and log evidence."""
@@ -66,16 +70,20 @@ class Problem:
         self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
 
     # ---- whitening
-    def set_covariance(self, values: np.ndarray) -> None:
-        """Take the statistics' covariance at a parameter point."""
+    def set_covariance(self, values: np.ndarray, shy: bool = False) -> None:
+        """Take the statistics' covariance at a parameter point; ``shy`` all but ignores erratic recordings."""
         cov = self.twin.covariance(values, self.part)
+        erratic = getattr(self.twin, "erratic", lambda name: False)
+        shy = shy and not all(erratic(name) for name in self.rows)
         self._blocks = []
-        for rows in self.rows.values():
+        for name, rows in self.rows.items():
             block = cov[np.ix_(rows, rows)]
             scale = np.sqrt(np.diag(block))
             correlation = block / np.outer(scale, scale)
             # a correlation known from finitely many numbers is never trusted to the last digit
             correlation = 0.98 * correlation + 0.02 * np.eye(len(rows))
+            if shy and erratic(name):
+                scale = 30.0 * scale
             self._blocks.append((rows, scale[:, None] * np.linalg.cholesky(correlation)))
 
     def whiten(self, x: np.ndarray) -> np.ndarray:
@@ -196,29 +204,48 @@ class Problem:
         evidence = -0.5 * objective - 0.5 * float(logdet)
         return Point(values, prediction, objective, misfit, evidence, tuple(free), jacobian, covariance)
 
-    def fit_null(self, iterations: int = 3) -> Point:
+    def descend(self, best: Point, widened: Sequence[int] = (), iterations: int = 4) -> Point:
+        """Gauss-Newton steps with the point's own derivatives, halved where they overshoot, until they gain nothing."""
+        for _ in range(iterations):
+            moved = self.solve(best.values, best.prediction, best.jacobian, best.free, widened)
+            if np.allclose(moved, best.values, rtol=0.0, atol=1e-12):
+                break
+            trial = self.point(moved, self.predict(moved)[0], best.jacobian, best.free, widened)
+            if trial.objective > best.objective:
+                for part in (0.4, 0.12):
+                    nearer = best.values + part * (moved - best.values)
+                    trial = self.point(nearer, self.predict(nearer)[0], best.jacobian, best.free, widened)
+                    if trial.objective < best.objective:
+                        break
+                else:
+                    break
+            done = trial.objective > best.objective - max(0.1, 1e-3 * best.objective)
+            best = trial
+            if done:
+                break
+        return best
+
+    def fit_null(self, rounds: int = 7) -> Point:
         """Fit of the nuisances alone; calls the twin's ``settle`` (noise, start angle) where it has one."""
         values = np.array([p.off if p.effect else p.mean for p in self.parameters])
         settle = getattr(self.twin, "settle", None)
-        for round_ in range(2):
-            if settle is not None:
-                settle(values, self.part)
-            self.set_covariance(values)
+        best, before = None, np.inf
+        for round_ in range(rounds):
+            if round_ < 2:
+                if settle is not None:
+                    settle(values, self.part)
+                # where the start is far off, only the smooth recordings lead the right way
+                self.set_covariance(values, shy=round_ == 0)
             prediction = self.predict(values)[0]
             jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
-            best = self.point(values, prediction, jacobian, self.nuisances)
-            for _ in range(iterations):
-                moved = self.solve(best.values, best.prediction, jacobian, self.nuisances)
-                trial = self.point(moved, self.predict(moved)[0], jacobian, self.nuisances)
-                if trial.objective > best.objective - 0.05:
-                    if trial.objective < best.objective:
-                        best = trial
-                    break
-                best = trial
+            best = self.descend(self.point(values, prediction, jacobian, self.nuisances))
             shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
             values = best.values
-            if round_ == 0 and shifted.max() < 0.05:
+            near = 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells)
+            if round_ > 0 and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
                 break
+            before = best.objective if round_ > 0 else np.inf
+        assert best is not None
         return best
 
     def rebase(self, null: Point, candidate: Candidate) -> Point:

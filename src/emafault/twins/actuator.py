@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,13 +15,15 @@ from ..faults import FAULT_NAMES
 from ..gap.twin import Cell, Hypothesis, Parameter
 from ..recording import Recording
 from .actuator_noise import CHANNELS, channel_spread, noise_covariance
-from .actuator_statistics import LATTICE, SIZE, Computed, Nominal, cells_of, compute
+from .actuator_statistics import _COMMUTATION, LATTICE, SIZE, Computed, Nominal, cells_of, compute
 
 HEALTHY_DEVIATION = 5e-4  # of N and xi in a recording called healthy (the format allows 1e-3)
 SOAK_DEVIATION = 0.5  # K, of the true ambient temperature about the measured
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 JITTER_REPEATS = 6
+COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
+COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
 START_SCATTER = 2e-3  # rad, over which commutations fall differently between the recording instants
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
 _TOLERANCES = {
@@ -56,10 +58,13 @@ class _Brought:
     signals: dict
     nominal: Nominal
     command: np.ndarray
+    jumps: np.ndarray  # samples at which the command has stepped
     computed: Computed
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]
     theta_0: float
+    jitter: np.ndarray = field(default_factory=lambda: np.zeros(SIZE))  # variance from where the switching falls
+    settled: int = 0  # how often noise has been taken
 
 
 class ActuatorTwin:
@@ -104,12 +109,17 @@ class ActuatorTwin:
         still = max(1, int(rest[0]) if len(rest) else len(signals["rotor_angle"]))
         theta_0 = float(np.mean(signals["rotor_angle"][: max(1, still - 1)]))
         nominal = Nominal.of(self.actuator, recording, theta_0)
-        duration = recording.interval * len(recording.time)
-        start = recording.time[0] - recording.interval
-        command = resample(recording.time - start, recording.commanded_position, duration, self.actuator.control_period)
+        rises = np.abs(np.diff(recording.commanded_position))
+        usual = np.maximum(np.roll(rises, 1), np.roll(rises, -1))
+        jumps = np.flatnonzero((rises > 20.0 * usual) & (rises > 5e-4)) + 1
+        command = self._command(recording, jumps)
         computed = compute(nominal, signals, keep=True)
         usable = computed.count >= MINIMUM_COUNT
-        return _Brought(recording, signals, nominal, command, computed, usable, {}, theta_0)
+        return _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
+
+    def erratic(self, name: str) -> bool:
+        """Whether small changes may change a recording's statistics abruptly: after a step the actuator hunts."""
+        return len(self._brought[name].jumps) > 0
 
     @property
     def names(self) -> list[str]:
@@ -285,62 +295,121 @@ class ActuatorTwin:
 
     # ---- noise
     def settle(self, values: np.ndarray, part: Sequence[str]) -> None:
-        """Take start angle, noise and the noise's bias of the statistics from a comparison with one simulated point."""
+        """Take start angle, step instants, noise and its bias of the statistics from a comparison with one simulated point.
+
+        The sensors of a bench are the same in all its recordings, so the noise of a channel is the median over them.
+        """
         runs = {name: self._runs(values[None, :], name)[0] for name in part}
-
-        def work(name: str) -> None:
-            b, run = self._brought[name], runs[name]
-            clean = self._simulate(name, run)
-            first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
-            drift = float(np.median((b.signals["rotor_angle"] - clean["rotor_angle"])[:first]))
-            if abs(drift) < 0.2:
-                b.theta_0 += drift
-            own, model = channel_spread(b.signals, b.nominal), channel_spread(clean, b.nominal)
-            fallback = {c: getattr(self.sensor_noise, c) for c in CHANNELS}
-            for channel in CHANNELS:
-                floor = 0.02 * fallback[channel]
-                spread = own.get(channel)
-                value = fallback[channel] if spread is None else spread
-                if spread is not None:
-                    value = np.sqrt(max(spread**2 - model.get(channel, 0.0) ** 2, floor**2))
-                b.noise[channel] = float(value)
-            rng = np.random.default_rng(1)
-            still = compute(b.nominal, clean).values
-            total = np.zeros(SIZE)
-            pairs = (("phase_voltage", "voltage"), ("phase_current", "current"), ("phase_current_end", "current_end"))
-            pairs += (("rotor_speed", "speed"), ("rotor_angle", "angle"), ("output_position", "position"))
-            pairs += (("bus_voltage", "bus_voltage"),)
-            for _ in range(NOISE_REPEATS):
-                noisy = dict(clean)
-                for signal, channel in pairs:
-                    noisy[signal] = clean[signal] + b.noise[channel] * rng.standard_normal(clean[signal].shape)
-                total += compute(b.nominal, noisy).values
-            self._offset[name] = total / NOISE_REPEATS - still
-            self._offset[name][LATTICE] = 0.0
-
         with ThreadPoolExecutor(self.threads) as pool:
-            list(pool.map(work, part))
+            clean = dict(zip(part, pool.map(lambda name: self._align(name, runs[name]), part), strict=True))
+            for channel, value in self._noise(clean).items():
+                for name in part:
+                    self._brought[name].noise[channel] = value
+            list(pool.map(lambda name: self._correct_bias(name, clean[name]), part))
         self._cache.clear()
+
+    def _align(self, name: str, run: np.void) -> dict:
+        """Start angle and, at the first comparison, the instants of command steps; returns noise-free signals."""
+        b = self._brought[name]
+        b.settled += 1
+        if b.settled == 1 and len(b.jumps):
+            self._place_steps(name, run)
+        clean = self._simulate(name, run)
+        first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
+        drift = float(np.median((b.signals["rotor_angle"] - clean["rotor_angle"])[:first]))
+        if abs(drift) < 0.2:
+            b.theta_0 += drift
+        return clean
+
+    def _place_steps(self, name: str, run: np.void) -> None:
+        """A step of the command lies somewhere in its recording interval: take the instant that fits the angle best."""
+        b = self._brought[name]
+        until = min(len(b.recording.time), int(b.jumps[0]) + max(10, round(0.015 / b.nominal.interval)))
+        best = np.inf
+        for part in (None, 0.0, 0.25, 0.5, 0.75, 1.0):
+            kept, b.command = b.command, self._command(b.recording, b.jumps, part)
+            angle = self._simulate(name, run)["rotor_angle"]
+            error = float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2))
+            if error < best:
+                best = error
+            else:
+                b.command = kept
+
+    def _command(self, recording: Recording, jumps: np.ndarray, part: float | None = None) -> np.ndarray:
+        """Command at the control ticks: linear between recorded values, but for jumps that happen at once.
+
+        ``part`` is the fraction of the interval after which a jump happens; None leaves it linear.
+        """
+        interval = recording.interval
+        duration = interval * len(recording.time)
+        time = recording.time - (recording.time[0] - interval)
+        position = recording.commanded_position
+        if part is not None and len(jumps):
+            moments = time[jumps] - interval * (1.0 - part)
+            time = np.concatenate([time, moments - 1e-6, moments - 1e-9])
+            position = np.concatenate([position, position[jumps - 1], position[jumps]])
+            order = np.argsort(time, kind="stable")
+            time, position = time[order], position[order]
+            keep = np.concatenate([[True], np.diff(time) > 0])
+            time, position = time[keep], position[keep]
+        return resample(time, position, duration, self.actuator.control_period)
+
+    def _noise(self, clean: Mapping[str, dict]) -> dict[str, float]:
+        """Noise of each channel (1 sigma): spread of the recordings less what the simulated machine itself does."""
+        found: dict[str, list[float]] = {c: [] for c in CHANNELS}
+        for name, signals in clean.items():
+            b = self._brought[name]
+            own, model = channel_spread(b.signals, b.nominal), channel_spread(signals, b.nominal)
+            for channel, spread in own.items():
+                found[channel].append(spread**2 - model.get(channel, 0.0) ** 2)
+        out = {}
+        for channel in CHANNELS:
+            usual = getattr(self.sensor_noise, channel)
+            value = float(np.median(found[channel])) if found[channel] else usual**2
+            out[channel] = float(np.sqrt(max(value, (0.05 * usual) ** 2)))
+        return out
+
+    def _correct_bias(self, name: str, clean: dict) -> None:
+        """Mean shift of the statistics by noise in their regressors."""
+        b = self._brought[name]
+        rng = np.random.default_rng(1)
+        still = compute(b.nominal, clean).values
+        total = np.zeros(SIZE)
+        for _ in range(NOISE_REPEATS):
+            noisy = dict(clean)
+            for channel, signal in CHANNELS.items():
+                noisy[signal] = clean[signal] + b.noise[channel] * rng.standard_normal(clean[signal].shape)
+            total += compute(b.nominal, noisy).values
+        self._offset[name] = total / NOISE_REPEATS - still
+        self._offset[name][LATTICE] = 0.0
 
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         blocks = []
         rng = np.random.default_rng(2)
         shifts = {name: START_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
+        offsets = {name: COMMAND_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
 
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            repeats = []
-            for shift in shifts[name]:
-                moved = run.copy()
-                moved["theta_0"] += shift
-                repeats.append(self._statistics_of(name, moved).values)
-            jitter = np.var(repeats, axis=0, ddof=1) * 1.4
+            if b.settled in (0, 1, 3):  # the second of a null fit's two rounds moves too little to simulate it anew
+                repeats = []
+                command = b.command
+                for shift, offset in zip(shifts[name], offsets[name], strict=True):
+                    moved = run.copy()
+                    moved["theta_0"] += shift
+                    b.command = command + offset
+                    repeats.append(self._statistics_of(name, moved).values)
+                b.command = command
+                b.jitter = np.var(repeats, axis=0, ddof=1) * 1.4
+            jitter = b.jitter
             cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
             # the recording scatters once and the single simulation it is compared with once more
+            aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
             extra = 2.0 * jitter + (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
+            extra[_COMMUTATION:] += aligned
             cov[np.diag_indices(SIZE)] += extra + 1e-18
             return cov[np.ix_(b.usable, b.usable)]
 
@@ -382,4 +451,3 @@ class ActuatorTwin:
                 low = max(value - z * sd, 1e-4)
                 out["C"] = (1.0 / max(value, 1e-4), 1.0 / (value + z * sd), 1.0 / low, "J/K")
         return out
-

@@ -20,12 +20,22 @@ from .actuator_statistics import (
     LATTICE,
     ORDER_HALF,
     OSCILLATION,
+    REST_SPEED,
     SIZE,
     Computed,
     Nominal,
 )
 
-CHANNELS = ("voltage", "current", "current_end", "speed", "angle", "position", "bus_voltage")
+#: channel -> recorded signal
+CHANNELS = {
+    "voltage": "phase_voltage",
+    "current": "phase_current",
+    "current_end": "phase_current_end",
+    "speed": "rotor_speed",
+    "angle": "rotor_angle",
+    "position": "output_position",
+    "bus_voltage": "bus_voltage",
+}
 LATTICE_DEVIATION = 0.02  # rad/s
 
 
@@ -38,17 +48,22 @@ def third_difference_deviation(values: np.ndarray) -> float:
 def channel_spread(signals: dict, nominal: Nominal) -> dict[str, float]:
     """Spread of each channel at the sample scale (SI): noise and whatever the machine itself does that fast.
 
-    Currents and voltages are taken where a phase floats, for there the current is zero and the voltage smooth.
+    Currents and voltages are taken where a phase floats and the rotor turns, for there the current is zero and the voltage
+    smooth; a recording without such samples leaves these channels out.
     """
     p, theta = nominal.constants[3], signals["rotor_angle"]
     middle = 0.5 * (theta[1:] + theta[:-1])
     span = 0.5 * p * np.abs(np.diff(theta))
     out = {}
+    reach = max(1, round(2e-3 / nominal.interval))
+    speed = np.abs(theta[2 * reach :] - theta[: -2 * reach]) / (2 * reach * nominal.interval)
+    turning = np.interp(np.arange(len(middle)), np.arange(len(speed)) + reach, speed) > REST_SPEED
     currents, ends, voltages = [], [], []
     for j in range(3):
         half = (p * middle - AXIS[j]) % np.pi
         off = np.minimum(half, np.pi - half) + span < np.pi / 6 - np.deg2rad(3.5)
         off[1:] &= off[:-1]
+        off &= turning
         rows = np.flatnonzero(off) + 1
         if len(rows) < 20:
             continue

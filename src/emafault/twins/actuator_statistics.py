@@ -228,6 +228,7 @@ def fill_statistics(
         span = 0.5 * poles * abs(theta[n] - theta[n - 1])
         margin = span + MARGIN
         sum_i = i[n, 0] + i[n, 1] + i[n, 2]
+        in_motion = abs(w) > REST_SPEED
         level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
         cos_1, sin_1 = np.cos(middle), np.sin(middle)
         cos_p, sin_p = np.cos(poles * middle), np.sin(poles * middle)
@@ -263,6 +264,11 @@ def fill_statistics(
             residual[j, n] = r
             sum_r += V[n, j] - k * f[j] * w - L * di - R * i[n, j]
             base = j * _PER_PHASE
+            if not in_motion:
+                # where exactly the rotor comes to rest is chance, and may be at the very edge of a commutation
+                if floating[j] > 0.0:
+                    _put(_SUM_I + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+                continue
             if plateau[j] > 0.0:
                 s = sign[j]
                 _put(base, n, s * w, r, y, norm, count, store)
@@ -302,8 +308,9 @@ def fill_statistics(
         for j in range(3):
             _put(_SUM_I + 1 + j, n, i[n, j], sum_i, y, norm, count, store)
         residual[4, n] = sum_r
-        _put(_SUM_V, n, 1.0, sum_r, y, norm, count, store)
-        _put(_SUM_V + 1, n, sum_f * w, sum_r, y, norm, count, store)
+        if in_motion:
+            _put(_SUM_V, n, 1.0, sum_r, y, norm, count, store)
+            _put(_SUM_V + 1, n, sum_f * w, sum_r, y, norm, count, store)
         # ---- speed sensor against the angle
         r = speed[n] - (theta[n] - theta[n - 1]) / dt
         residual[5, n] = r
@@ -312,8 +319,7 @@ def fill_statistics(
         _put(_SPEED + 2, n, a_slow, r, y, norm, count, store)
         _put(_SPEED + 3, n, 1.0 if w > 0.0 else -1.0, r, y, norm, count, store)
         # ---- torque balance in motion
-        moving = abs(w) > REST_SPEED
-        if moving:
+        if in_motion:
             d = 1.0 if w > 0.0 else -1.0
             r = drive - J * a - B * w - T_c * d
             residual[6, n] = r
@@ -337,7 +343,7 @@ def fill_statistics(
         residual[7, n] = r
         smooth_play += (r - smooth_play) * min(1.0, dt / 5.0e-3)
         play_power += (r - smooth_play) ** 2
-        if moving:
+        if in_motion:
             _put(_POSITION + (0 if w > 0.0 else 1), n, 1.0, r, y, norm, count, store)
         _put(_POSITION + 2, n, a_slow, r, y, norm, count, store)
         _put(_POSITION + 3, n, w, r, y, norm, count, store)
@@ -375,7 +381,7 @@ def fill_statistics(
                 rise = pair_mean[n - m] - pair_mean[n - m - 1]
                 _put(_CONTROL + m, n, rise, r, y, norm, count, store)
         # ---- currents around the commutations
-        if moving and abs(pair_mean[n]) > 0.2:
+        if in_motion and abs(pair_mean[n]) > 0.2:
             for j in range(3):
                 half = x[j] if x[j] < np.pi else x[j] - np.pi
                 share = min(max(sign[j] * i[n, j] / pair_mean[n], -0.5), 1.5)
