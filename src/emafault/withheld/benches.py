@@ -1,0 +1,134 @@
+"""Simulates, measures and writes blind cases: a folder of recordings each, and a key elsewhere.
+
+``FOLDER/benches/NAME/recording_N.nc`` is what a diagnosis may see, ``FOLDER/keys/NAME.json`` what the scoring reads.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from ..actuator.commands import command_positions
+from ..actuator.fixed_step import quantise_by_truncation, simulate_fixed_step
+from ..actuator.parameters import ActuatorParameters, make_runs
+from ..actuator.sensors import SensorNoise, measure
+from ..actuator.simulate import simulate, time_axis
+from ..effects import EFFECTS
+from ..recording import Recording, replace_atomically, write_recording
+from .cases import Case, case_from_dict, draw_case
+from .detectability import Detector
+
+
+def make_cases(
+    rung: str,
+    seeds: Iterable[int],
+    folder: str | Path,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    rivals: bool = False,
+) -> list[str]:
+    """Make the benches and keys of a rung's seeds; what is there already is left alone.
+
+    ``rivals`` adds the distance to the nearest effect of the same equations to each key, at twice the cost.
+
+    Returns
+    -------
+    names of the cases
+
+    Raises
+    ------
+    InputError : an unknown rung, or a folder that cannot be written
+    """
+    folder = Path(folder)
+    names = []
+    for seed in seeds:
+        case = draw_case(rung, int(seed))
+        names.append(case.name)
+        key = folder / "keys" / f"{case.name}.json"
+        if key.exists():
+            continue
+        signals = write_bench(case, folder / "benches" / case.name, actuator, noise)
+        write_key(case, key, actuator, noise, signals, rivals)
+    return names
+
+
+def simulate_truth(case: Case, actuator: ActuatorParameters) -> list[dict[str, np.ndarray]]:
+    """Noise-free signals of each recording; a case with other forms runs on the other integrator."""
+    out = []
+    for plan in case.recordings:
+        runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
+        command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
+        if case.forms:
+            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, forms=case.forms)
+        else:
+            signals = simulate(runs, command, plan.duration, plan.interval)
+        out.append(signals)
+    return out
+
+
+def write_bench(
+    case: Case, folder: Path, actuator: ActuatorParameters, noise: SensorNoise
+) -> list[dict[str, np.ndarray]]:
+    """Write a case's recordings and return their noise-free signals."""
+    truth = simulate_truth(case, actuator)
+    scaled = SensorNoise(**{k: v * case.noise_scale.get(k, 1.0) for k, v in asdict(noise).items()})
+    for n, (plan, signals) in enumerate(zip(case.recordings, truth)):
+        runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
+        truncate = "speed_quantisation" in case.forms
+        step = float(runs["speed_quantisation_step"][0])
+        if truncate:
+            runs["speed_quantisation_step"] = 0.0
+        measured = measure(signals, runs, scaled, 1_000_003 * case.seed + 7919 * len(case.rung + case.name) + n)
+        speed = measured["rotor_speed"][0]
+        recording = Recording(
+            time=time_axis(plan.duration, plan.interval),
+            phase_voltage=measured["phase_voltage"][0],
+            phase_current=measured["phase_current"][0],
+            phase_current_end=measured["phase_current_end"][0] if case.end_current else None,
+            rotor_speed=quantise_by_truncation(speed, step) if truncate else speed,
+            rotor_angle=measured["rotor_angle"][0],
+            output_position=measured["output_position"][0],
+            commanded_position=measured["commanded_position"][0],
+            bus_voltage=measured["bus_voltage"][0] if case.bus_voltage else None,
+            ambient_temperature=float(measured["ambient_temperature"][0]),
+            attributes={"command": plan.command, "health": plan.health, "unit": case.name},
+        )
+        write_recording(folder / f"recording_{n}.nc", recording)
+    return truth
+
+
+def write_key(
+    case: Case, path: Path, actuator: ActuatorParameters, noise: SensorNoise, truth, rivals: bool = False
+) -> None:
+    """Write the truth of a case, with its detectability where it holds an effect."""
+    key: dict = {"case": case.to_dict(), "detectability": None, "fault_sd": None, "nearest_rival": None}
+    key["actuator"], key["noise"] = asdict(actuator), asdict(noise)
+    if case.effects:
+        detector = Detector(case, actuator, noise, truth)
+        found = detector.detectability()
+        key["detectability"] = {"nominal": found.nominal, "members": found.members}
+        key["fault_sd"] = found.fault_sd
+        if rivals and len(case.effects) == 1:
+            distances = {r: detector.linear_rival(r) for r in near_rivals(next(iter(case.effects)))}
+            nearest = min(distances, key=lambda r: distances[r])
+            key["nearest_rival"] = {"effect": nearest, "distance": distances[nearest]}
+    replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(key, indent=1)))
+
+
+def near_rivals(effect: str) -> list[str]:
+    """Effects that are to be found in one of the same equations."""
+    mine = set(EFFECTS[effect].equations)
+    return [e for e in EFFECTS if e != effect and mine & set(EFFECTS[e].equations)]
+
+
+def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
+    """Squared distances from a case's truth to the nearest point of other effects, simulated again from the key alone."""
+    wanted = list(rivals)
+    if not wanted:
+        return {}
+    case = case_from_dict(key["case"])
+    actuator, noise = ActuatorParameters(**key["actuator"]), SensorNoise(**key["noise"])
+    detector = Detector(case, actuator, noise, simulate_truth(case, actuator))
+    return {rival: detector.distance_to(rival) for rival in wanted}

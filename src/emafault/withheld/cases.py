@@ -1,0 +1,260 @@
+"""What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
+
+A case is a pure function of its rung and seed. Successive seeds go through the effects in order, and through strata of the
+amplitude after that, so that any run of ``effects x strata`` seeds is balanced.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from ..effects import EFFECTS
+from ..errors import InputError
+
+RUNGS = ("T0", "T1", "T2", "T3", "T4")
+STRATA = {"T1": 20, "T3": 5, "T4": 5}  # amplitude strata per effect
+SMALLEST = 0.01  # of the realistic maximum: below the noise
+#: parameters that say how an effect looks, not how strong it is: uniform over their range, whatever the amplitude
+SHAPE_PARAMETERS = {("dynamic_eccentricity", "psi"), ("self_heating", "Rth"), ("stribeck", "w_s"), ("compliance", "C")}
+STRONG = (0.10, 0.20)  # largest N_j and |xi| of strong faults
+WEAK = (0.02, 0.03)
+HEALTHY = 1e-3  # what "healthy" may still hide
+HEALTH_MIXES = (
+    ("healthy",),
+    ("healthy", "unknown"),
+    ("healthy", "seeded"),
+    ("unknown",),
+    ("seeded",),
+    ("healthy", "unknown", "seeded"),
+)
+HEALTH_ODDS = (0.15, 0.30, 0.20, 0.20, 0.05, 0.10)
+INTERVALS = (5e-5, 1e-4, 2e-4, 2.5e-4, 4e-4, 5e-4, 1e-3)  # s
+INTERVAL_ODDS = (0.08, 0.17, 0.40, 0.10, 0.08, 0.10, 0.07)
+
+
+@dataclass(frozen=True)
+class RecordingPlan:
+    """One recording of a bench: what was commanded, how it was recorded, the state of the unit."""
+
+    command: str
+    settings: Mapping[str, float]
+    duration: float  # s
+    interval: float  # s
+    health: str
+    fault: tuple[float, ...]  # N_a, N_b, N_c, xi_x, xi_y, dT; dT is the true soak temperature
+    theta_0: float  # rad
+
+
+@dataclass(frozen=True)
+class Case:
+    """One bench and its truth."""
+
+    rung: str
+    seed: int
+    effects: Mapping[str, Mapping[str, float]]  # effect -> parameter -> value
+    tolerances: Mapping[str, Mapping[str, float]]  # calibration effect -> parameter -> value of this unit
+    recordings: tuple[RecordingPlan, ...]
+    noise_scale: Mapping[str, float]  # channel -> factor
+    end_current: bool  # optional variables present
+    bus_voltage: bool
+    amplitude: float | None = None  # fraction of the realistic maximum, where one effect was drawn
+    strong_faults: bool = False
+    left_out: tuple[str, ...] = ()  # effects that the library lacks when this case is diagnosed
+    forms: tuple[str, ...] = field(default=())  # effects in their alternative form
+
+    @property
+    def name(self) -> str:
+        """Name of the bench; it says nothing about the truth."""
+        return f"{self.rung.lower()}_{self.seed:06d}"
+
+    def unit(self) -> dict[str, dict[str, float]]:
+        """Tolerances and effects together, as the simulation takes them."""
+        merged = {k: dict(v) for k, v in self.tolerances.items()}
+        for effect, values in self.effects.items():
+            merged[effect] = {**merged.get(effect, {}), **values}
+        return merged
+
+    def to_dict(self) -> dict:
+        """Plain types, for the key."""
+        return asdict(self)
+
+
+def case_from_dict(raw: Mapping) -> Case:
+    """Inverse of ``Case.to_dict`` after a round through JSON."""
+    fields = dict(raw)
+    fields["recordings"] = tuple(RecordingPlan(**{**r, "fault": tuple(r["fault"])}) for r in raw["recordings"])
+    fields["left_out"], fields["forms"] = tuple(raw["left_out"]), tuple(raw["forms"])
+    return Case(**fields)
+
+
+def draw_case(rung: str, seed: int) -> Case:
+    """Draw the case of a rung and seed.
+
+    Raises
+    ------
+    InputError : an unknown rung
+    """
+    if rung not in RUNGS:
+        raise InputError(f"rung: got '{rung}', accepted are {', '.join(RUNGS)}")
+    rng = np.random.default_rng([RUNGS.index(rung), seed])
+    ids = list(EFFECTS)
+    effects: dict[str, dict[str, float]] = {}
+    amplitude: float | None = None
+    strong = False
+    if rung == "T0":
+        strong = seed % 2 == 1
+    elif rung == "T2":
+        kind = seed % 10  # five of ten hold two effects, two hold three, three hold one with strong faults
+        strong = kind >= 7
+        for effect in rng.choice(ids, size=1 if strong else 2 if kind < 5 else 3, replace=False):
+            effects[str(effect)] = draw_effect(str(effect), 10.0 ** rng.uniform(-1.0, 0.0), rng)
+    else:
+        effect = ids[seed % len(ids)]
+        stratum = (seed // len(ids)) % STRATA[rung]
+        amplitude = SMALLEST ** (1.0 - (stratum + rng.random()) / STRATA[rung])
+        effects[effect] = draw_effect(effect, amplitude, rng)
+    single = tuple(effects)
+    return Case(
+        rung=rung,
+        seed=seed,
+        effects=effects,
+        tolerances=draw_tolerances(rng),
+        recordings=draw_bench(strong, rng),
+        noise_scale={c: float(s) for c, s in _noise_scale(rng).items()},
+        end_current=bool(rng.random() > 0.15),
+        bus_voltage=bool(rng.random() > 0.15),
+        amplitude=amplitude,
+        strong_faults=strong,
+        left_out=single if rung == "T3" else (),
+        forms=single if rung == "T4" else (),
+    )
+
+
+def draw_tolerances(rng: np.random.Generator) -> dict[str, dict[str, float]]:
+    """Values of the calibration parameters of a unit within its specification."""
+    return {
+        effect.id: {
+            name: p.nominal * (1.0 + p.tolerance * float(rng.standard_normal()))
+            for name, p in effect.parameters.items()
+            if p.tolerance > 0.0
+        }
+        for effect in EFFECTS.values()
+        if effect.kind == "calibration"
+    }
+
+
+def draw_effect(effect: str, amplitude: float, rng: np.random.Generator) -> dict[str, float]:
+    """Draw the parameters of one effect.
+
+    ``amplitude`` is the fraction of the realistic maximum that the largest of its parameters takes; one whose realistic
+    range starts away from zero goes log-uniformly over that range instead. A calibration effect has no amplitude: at
+    least one parameter is outside four sigma.
+    """
+    parameters = EFFECTS[effect].parameters
+    if EFFECTS[effect].kind == "calibration":
+        while True:
+            values = {n: float(rng.uniform(p.low, p.high)) for n, p in parameters.items()}
+            if any(abs(values[n] - p.nominal) > 4.0 * p.tolerance * abs(p.nominal) for n, p in parameters.items()):
+                return values
+    amplitudes = [n for n in parameters if (effect, n) not in SHAPE_PARAMETERS]
+    pattern = rng.uniform(0.0, 1.0, len(amplitudes))
+    pattern[rng.integers(len(amplitudes))] = 1.0
+    position = 1.0 - np.log(amplitude) / np.log(SMALLEST)  # 0 at the smallest amplitude, 1 at the realistic maximum
+    values = {}
+    for name, p in parameters.items():
+        if name not in amplitudes:
+            values[name] = float(rng.uniform(p.low, p.high))
+        elif p.low <= p.nominal <= p.high:
+            reach = p.high - p.nominal if p.high > p.nominal else p.low - p.nominal
+            if p.low < p.nominal < p.high and rng.random() < 0.5:
+                reach = p.low - p.nominal
+            values[name] = float(p.nominal + amplitude * pattern[amplitudes.index(name)] * reach)
+        else:
+            near, far = (p.low, p.high) if p.low > p.nominal else (p.high, p.low)
+            values[name] = float(near * (far / near) ** position)
+    return values
+
+
+def draw_bench(strong: bool, rng: np.random.Generator) -> tuple[RecordingPlan, ...]:
+    """Draw four to eight recordings: commands, lengths, intervals, soak temperatures and states of health."""
+    count = int(rng.integers(4, 9))
+    mix = HEALTH_MIXES[rng.choice(len(HEALTH_MIXES), p=HEALTH_ODDS)]
+    if strong and mix == ("healthy",):
+        mix = ("healthy", "unknown")
+    health = [*mix, *rng.choice(mix, count - len(mix))]
+    largest = STRONG if strong else WEAK
+    common = _draw_fault(largest, rng) if strong or rng.random() < 0.5 else np.zeros(5)
+    levels = rng.uniform(-50.0, 70.0, int(rng.integers(2, 5)))
+    while np.ptp(levels) < 20.0:
+        levels = rng.uniform(-50.0, 70.0, len(levels))
+    temperature = [*levels[:2], *rng.choice(levels, count - 2)]
+    rng.shuffle(temperature)
+    common_interval = _draw_interval(rng)
+    mixed = rng.random() < 0.4
+    plans = []
+    for n in range(count):
+        duration = round(float(rng.uniform(0.4, 1.0)), 2)
+        interval = _draw_interval(rng) if mixed else common_interval
+        command, settings = _draw_command(duration, rng)
+        state = str(health[n])
+        if state == "healthy":
+            fault = _draw_fault((HEALTHY, HEALTHY), rng)
+        elif state == "unknown":
+            fault = common
+        else:
+            fault = _draw_fault(largest, rng)
+        plans.append(
+            RecordingPlan(
+                command=command,
+                settings=settings,
+                duration=interval * round(duration / interval),
+                interval=interval,
+                health=state,
+                fault=tuple(float(x) for x in [*fault, temperature[n]]),
+                theta_0=float(rng.uniform(0.0, 2.0 * np.pi)),
+            )
+        )
+    order = rng.permutation(count)
+    return tuple(plans[n] for n in order)
+
+
+def _draw_fault(largest: tuple[float, float], rng: np.random.Generator) -> np.ndarray:
+    radius, direction = largest[1] * rng.random(), rng.uniform(-np.pi, np.pi)
+    return np.array([*(largest[0] * rng.random(3)), radius * np.cos(direction), radius * np.sin(direction)])
+
+
+def _draw_interval(rng: np.random.Generator) -> float:
+    """Mostly round figures, now and then any whole number of microseconds (s)."""
+    if rng.random() < 0.15:
+        return round(float(np.exp(rng.uniform(np.log(5e-5), np.log(1e-3)))), 6)
+    return float(rng.choice(INTERVALS, p=INTERVAL_ODDS))
+
+
+def _draw_command(duration: float, rng: np.random.Generator) -> tuple[str, dict[str, float]]:
+    """A command that moves within the end stops and the speed limit."""
+    sign = float(rng.choice((-1.0, 1.0)))
+    name = str(rng.choice(("parabolic", "ramp", "step", "sine", "chirp", "reversal"), p=(0.3, 0.1, 0.1, 0.2, 0.1, 0.2)))
+    speed = float(np.exp(rng.uniform(np.log(0.05), np.log(0.5))))  # rad/s at the output
+    settings: dict[str, float]
+    if name == "parabolic":
+        settings = {"acceleration": sign * float(rng.uniform(0.15, 0.7))}
+    elif name == "ramp":
+        settings = {"speed": sign * min(speed, 0.4 / duration)}
+    elif name == "step":
+        settings = {"amplitude": sign * float(rng.uniform(0.003, 0.05)), "time": float(rng.uniform(0.01, 0.08))}
+    elif name == "sine":
+        frequency = float(rng.uniform(1.0, 6.0))
+        settings = {"amplitude": sign * min(speed / (2.0 * np.pi * frequency), 0.3), "frequency": frequency}
+    elif name == "chirp":
+        low, high = float(rng.uniform(0.5, 2.0)), float(rng.uniform(4.0, 12.0))
+        settings = {"amplitude": sign * speed / (2.0 * np.pi * high), "frequency_start": low, "frequency_end": high}
+    else:
+        settings = {"amplitude": speed * duration / float(rng.uniform(2.2, 8.0)), "speed": speed}
+    return name, settings
+
+
+def _noise_scale(rng: np.random.Generator) -> dict[str, float]:
+    bench = np.exp(rng.uniform(np.log(0.5), np.log(2.0)))
+    channels = ("voltage", "current", "current_end", "speed", "angle", "position", "bus_voltage")
+    return {channel: bench * rng.uniform(0.8, 1.25) for channel in channels}
