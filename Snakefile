@@ -23,6 +23,7 @@ rule study:
         f"{EXPERIMENT}/report.html",
         case_files("report.html"),
         case_files("tracked.json"),
+        [path for case in PLAN.cases for part in case.parts for path in feature_tables(case, part)],
 
 
 rule datasets:

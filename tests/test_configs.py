@@ -1,4 +1,4 @@
-"""Every experiment composes; what does not fit is refused in one line that names the key, the value and what is accepted."""
+"""Every experiment composes; what does not fit is refused in one line naming key, value and what is accepted."""
 
 import pytest
 
@@ -60,7 +60,7 @@ def test_refusals_name_key_value_and_what_is_accepted(overrides, says):
 
 
 def test_unknown_experiment_lists_those_there_are():
-    with pytest.raises(InputError, match="got 'nothing'.*paper.*smoke"):
+    with pytest.raises(InputError, match=r"got 'nothing'.*paper.*smoke"):
         config.plan("nothing")
 
 

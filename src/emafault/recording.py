@@ -1,7 +1,7 @@
 """The recording format: one netCDF-4 file holds one recording of the actuator, simulated or measured.
 
-Reading and writing live here together. Arrays in memory have the phase as their trailing axis, (time, phase); in the file
-it leads, (phase, time).
+Reading and writing live here together. Arrays in memory have the phase as their trailing axis, (time, phase); in
+the file it leads, (phase, time).
 """
 
 import contextlib
@@ -69,6 +69,7 @@ def replace_atomically(path: Path, write) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(path)
         write(temporary)
         os.replace(temporary, path)
     except OSError as error:
@@ -78,6 +79,14 @@ def replace_atomically(path: Path, write) -> None:
     finally:
         with contextlib.suppress(OSError):  # nothing to remove where nothing could be written
             temporary.unlink(missing_ok=True)
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove what processes that were killed while writing ``path`` left behind."""
+    for part in path.parent.glob(f".{path.name}.*.part"):
+        process = part.suffixes[-2].removeprefix(".")
+        if process.isdigit() and not Path(f"/proc/{process}").exists():
+            part.unlink(missing_ok=True)
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:
