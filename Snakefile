@@ -29,20 +29,10 @@ rule study:
 rule datasets:
     """Only simulate."""
     input:
-        [
-            path
-            for case in PLAN.cases
-            for part in case.parts
-            for path in shards(case, part)
-        ],
+        [path for case in PLAN.cases for part in case.parts for path in shards(case, part)],
 
 
 rule features:
     """Simulate and reconstruct."""
     input:
-        [
-            path
-            for case in PLAN.cases
-            for part in case.parts
-            for path in feature_tables(case, part)
-        ],
+        [path for case in PLAN.cases for part in case.parts for path in feature_tables(case, part)],

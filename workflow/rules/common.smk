@@ -11,9 +11,7 @@ from emafault.errors import InputError
 RESULTS = "results"
 
 try:
-    PLAN = configuration.plan(
-        config.get("experiment", "paper"), config.get("overrides", "")
-    )
+    PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
     configuration.check_writable(RESULTS)
 except InputError as error:
     sys.exit(f"emafault: {error}")
@@ -24,13 +22,9 @@ CASE = f"{RESULTS}/experiments/{{case}}"
 
 wildcard_constraints:
     case="|".join(case.path for case in PLAN.cases),
-    dataset="|".join(
-        sorted({name for case in PLAN.cases for name in case.datasets.values()})
-    ),
+    dataset="|".join(sorted({name for case in PLAN.cases for name in case.datasets.values()})),
     part="|".join(configuration.PARTS),
-    method="|".join(
-        sorted({name for case in PLAN.cases for name in case.config["reconstruction"]})
-    ),
+    method="|".join(sorted({name for case in PLAN.cases for name in case.config["reconstruction"]})),
     estimator="closed_form|network|searched",
     shard=r"\d+",
     worker=r"\d+",
@@ -38,9 +32,7 @@ wildcard_constraints:
 
 def code(script):
     """Digest of a script and of everything of the package that it imports."""
-    return configuration.source_digest(
-        f"{workflow.basedir}/workflow/scripts/{script}.py"
-    )
+    return configuration.source_digest(f"{workflow.basedir}/workflow/scripts/{script}.py")
 
 
 def composed(wildcards):
@@ -70,10 +62,7 @@ def dataset_spec(wildcards):
 def shards(case, part):
     """The files of one part of a case's dataset."""
     number = case.config["sampling"]["shards"]
-    return [
-        f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc"
-        for shard in range(number)
-    ]
+    return [f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc" for shard in range(number)]
 
 
 def shards_of_part(wildcards):
@@ -83,11 +72,7 @@ def shards_of_part(wildcards):
 def feature_tables(case, part):
     """The tables of features of one part of a case, by every method."""
     folder = f"{RESULTS}/experiments/{case.path}/features"
-    return [
-        f"{folder}/{part}_{method}.nc"
-        for method in case.config["reconstruction"]
-        if part in case.parts
-    ]
+    return [f"{folder}/{part}_{method}.nc" for method in case.config["reconstruction"] if part in case.parts]
 
 
 def reconstruction_spec(wildcards):
@@ -122,17 +107,12 @@ def search_storage(wildcards):
 
 def searching_workers(wildcards):
     number = composed(wildcards)["search"]["workers"]
-    return [
-        f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json"
-        for worker in range(number)
-    ]
+    return [f"{RESULTS}/experiments/{wildcards.case}/search/worker_{worker}.json" for worker in range(number)]
 
 
 def search_results(wildcards):
     names = ("trials", "chosen") if composed(wildcards)["search"]["trials"] else ()
-    return [
-        f"{RESULTS}/experiments/{wildcards.case}/search/{name}.json" for name in names
-    ]
+    return [f"{RESULTS}/experiments/{wildcards.case}/search/{name}.json" for name in names]
 
 
 def chosen_network(wildcards):
@@ -153,18 +133,13 @@ def histories(wildcards):
             *(["searched"] if method == searched else []),
         )
     ]
-    return [
-        f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}/history.json"
-        for name in names
-    ]
+    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}/history.json" for name in names]
 
 
 def exported_network(wildcards):
     """The network worth embedding: the searched one, else that of the last method."""
     networks = [path for path in histories(wildcards) if "closed_form" not in path]
-    return ([path for path in networks if "identifiers/paper" not in path] or networks)[
-        -1:
-    ]
+    return ([path for path in networks if "identifiers/paper" not in path] or networks)[-1:]
 
 
 def exported_features(wildcards):
