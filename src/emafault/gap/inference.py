@@ -106,9 +106,19 @@ class Problem:
         return self.twin.predict(np.atleast_2d(points), self.part)
 
     def nuisance_jacobian(self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int]) -> np.ndarray:
-        """(statistic, free) forward differences; parameters of disjoint recordings are moved together."""
+        """(statistic, free) forward differences; parameters of disjoint recordings are moved together.
+
+        A twin may know some derivatives exactly from others: ``derived`` names them and ``derive(name, values, derivative,
+        recording)`` gives the rows of one recording from a function that returns those of another parameter. What cancels
+        exactly in truth then cancels here too, where noisy differences would feign information.
+        """
+        derived = set(getattr(self.twin, "derived", ()))
+        known = [m for m in free if self.parameters[m].name in derived]
+        asked = list(free)
+        if known:
+            asked = [m for m in self.nuisances if self.parameters[m].name not in derived]
         batches: list[list[int]] = []
-        for m in free:
+        for m in asked:
             own = set(self.parameters[m].recordings or self.part)
             for batch in batches:
                 if all(own.isdisjoint(self.parameters[o].recordings or self.part) for o in batch):
@@ -127,8 +137,8 @@ class Problem:
                 steps[m] = step
             points.append(point)
         differences = self.predict(np.array(points)) - prediction
-        out = np.zeros((len(self.cells), len(free)))
-        column = {m: c for c, m in enumerate(free)}
+        out = np.zeros((len(self.cells), len(asked)))
+        column = {m: c for c, m in enumerate(asked)}
         for batch, difference in zip(batches, differences, strict=True):
             for m in batch:
                 recordings = self.parameters[m].recordings
@@ -136,7 +146,22 @@ class Problem:
                     if name in self.rows:
                         rows = self.rows[name]
                         out[rows, column[m]] = difference[rows] / steps[m]
-        return out
+        if not known:
+            return out
+        whole = {self.parameters[m].name: out[:, column[m]] for m in asked}
+        # the later of the derived ones may need the earlier
+        for name in self.twin.derived:  # type: ignore[attr-defined]
+            m = self.names[name]
+            rows_of = self.parameters[m].recordings or self.part
+            values_of = np.zeros(len(self.cells))
+            for recording in rows_of:
+                if recording in self.rows:
+                    rows = self.rows[recording]
+                    values_of[rows] = self.twin.derive(  # type: ignore[attr-defined]
+                        name, values, lambda other, rows=rows: whole[other][rows], recording
+                    )
+            whole[name] = values_of
+        return np.stack([whole[self.parameters[m].name] for m in free], axis=1)
 
     # ---- fits
     def prior(self, free: Sequence[int], widened: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
@@ -247,6 +272,17 @@ class Problem:
             before = best.objective if round_ > 0 else np.inf
         assert best is not None
         return best
+
+    def refit_null(self, null: Point, start: Point) -> Point:
+        """The null fitted once more from where a candidate's nuisances ended, so that both had the same chance."""
+        values = start.values.copy()
+        for m, p in enumerate(self.parameters):
+            if p.effect is not None:
+                values[m] = p.off
+        prediction = self.predict(values)[0]
+        jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
+        again = self.descend(self.point(values, prediction, jacobian, self.nuisances))
+        return again if again.objective < null.objective else null
 
     def rebase(self, null: Point, candidate: Candidate) -> Point:
         """Take noise, covariance and nuisance derivatives at a candidate's fit; returns the null refitted under them.

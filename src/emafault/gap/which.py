@@ -1,7 +1,7 @@
 """Which effect: evidence of the empty set, every effect, pairs and triples by beam; goodness of fit; groups; unknown."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -10,11 +10,13 @@ from .inference import Candidate, Point, Problem
 from .twin import Hypothesis
 
 FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
+CERTAIN = 1.0  # standard deviations of the fit by which it must lie beyond
 GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same trace
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
 REBASES = 3
+CLOSE = 100.0  # gain below which the empty set is fitted a second time
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 
 
@@ -57,9 +59,12 @@ def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
 
 
 def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances."""
-    own = problem.effect_parameters(hypothesis)
-    return any(abs(point.values[m] - problem.mean[m]) > FAR_OUTSIDE * problem.sd[m] for m in own)
+    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances by more than its uncertainty."""
+    for m in problem.effect_parameters(hypothesis):
+        deviation = float(np.sqrt(point.covariance[point.free.index(m), point.free.index(m)]))
+        if abs(point.values[m] - problem.mean[m]) - CERTAIN * deviation > FAR_OUTSIDE * problem.sd[m]:
+            return True
+    return False
 
 
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
@@ -121,6 +126,11 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             break
         beam = _best(tried, size)[:2]
     _prune(problem, null, tried, by_id, accept)
+    if tried and 0.0 < max(c.gain for c in tried.values()) < CLOSE:
+        again = problem.refit_null(null, max(tried.values(), key=lambda c: c.gain).point)
+        better = again.log_evidence - null.log_evidence
+        if again is not null and better > 0.0:
+            null, tried = again, {k: replace(c, gain=c.gain - better) for k, c in tried.items()}
     # an effect more must be worth it: ``addition`` is the prior odds against each further member of a set
     candidates = sorted(tried.values(), key=lambda c: addition * (len(c.effects) - 1) - c.gain)
     prediction = candidates[0].point.prediction if candidates else null.prediction

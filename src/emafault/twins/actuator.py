@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class _Brought:
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]
     theta_0: float
-    jitter: np.ndarray = field(default_factory=lambda: np.zeros(SIZE))  # variance from where the switching falls
+    jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     settled: int = 0  # how often noise has been taken
 
 
@@ -141,10 +141,10 @@ class ActuatorTwin:
             out.append(Parameter(f"{effect}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd))
         groups: dict[str, list[str]] = {}
         for name, b in self._brought.items():
-            key = f"seeded {name}" if b.recording.health == "seeded" else b.recording.health
+            key = "unknown" if b.recording.health == "unknown" else f"{b.recording.health} {name}"
             groups.setdefault(key, []).append(name)
         for key, members in groups.items():
-            healthy = key == "healthy"
+            healthy = key.startswith("healthy")
             for component in FAULT_NAMES[:5]:
                 turns = component.startswith("N")
                 mean, sd = (0.0, HEALTHY_DEVIATION) if healthy else ((0.03, 0.05) if turns else (0.0, 0.1))
@@ -191,6 +191,36 @@ class ActuatorTwin:
                         effect.id,
                     )
                 )
+        return out
+
+    @property
+    def derived(self) -> list[str]:
+        """Nuisances whose derivatives follow exactly from those of others (see ``derive``)."""
+        return ["unit_calibration.k_scale", *(f"{name}.dT" for name in self._brought)]
+
+    def derive(self, name: str, values: np.ndarray, derivative, recording: str) -> np.ndarray:
+        """Derivative of one recording's statistics by a parameter that acts only through others.
+
+        Shorting turns in all phases alike is a smaller R, k and L (twice): sum (1 - N_j) d/dN_j = -(R d/dR + k d/dk +
+        2 L d/dL). A temperature acts through R, and through k and friction where their own coefficients are on.
+        """
+        at = {p.name: float(v) for p, v in zip(self.parameters, values, strict=True)}
+        R, k, L = "unit_calibration.R_scale", "unit_calibration.k_scale", "inductance_tolerance.L_scale"
+        if name == k:
+            total = -at[R] * derivative(R) - 2.0 * at[L] * derivative(L)
+            for p in self.parameters:
+                if p.fault in FAULT_NAMES[:3] and recording in (p.recordings or ()):
+                    total = total - (1.0 - at[p.name]) * derivative(p.name)
+            return total / at[k]
+        dT = at[name]
+        alpha = self.actuator.copper_coefficient
+        out = at[R] * alpha / (1.0 + alpha * dT) * derivative(R)
+        alpha_m = at.get("magnet_temperature.alpha_m", 0.0)
+        beta, level = at.get("friction_temperature.beta", 0.0), "friction_level.scale"
+        if alpha_m != 0.0:
+            out = out + at[k] * alpha_m / (1.0 + alpha_m * dT) * derivative(k)
+        if beta != 0.0:
+            out = out + at[level] * beta / (1.0 + beta * dT) * derivative(level)
         return out
 
     def _hypotheses(self) -> list[Hypothesis]:
@@ -312,7 +342,7 @@ class ActuatorTwin:
         """Start angle and, at the first comparison, the instants of command steps; returns noise-free signals."""
         b = self._brought[name]
         b.settled += 1
-        if b.settled == 1 and len(b.jumps):
+        if b.settled <= 2 and len(b.jumps):
             self._place_steps(name, run)
         clean = self._simulate(name, run)
         first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
@@ -326,7 +356,7 @@ class ActuatorTwin:
         b = self._brought[name]
         until = min(len(b.recording.time), int(b.jumps[0]) + max(10, round(0.015 / b.nominal.interval)))
         best = np.inf
-        for part in (None, 0.0, 0.25, 0.5, 0.75, 1.0):
+        for part in (None, 0.0, 0.25, 0.5, 0.75, 0.9, 1.0):
             kept, b.command = b.command, self._command(b.recording, b.jumps, part)
             angle = self._simulate(name, run)["rotor_angle"]
             error = float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2))
@@ -393,7 +423,7 @@ class ActuatorTwin:
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            if b.settled in (0, 1, 3):  # the second of a null fit's two rounds moves too little to simulate it anew
+            if b.jitter is None or b.settled in (0, 1, 3):  # the second of a null fit's two rounds moves too little to simulate it anew
                 repeats = []
                 command = b.command
                 for shift, offset in zip(shifts[name], offsets[name], strict=True):

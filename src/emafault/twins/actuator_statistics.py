@@ -34,6 +34,7 @@ ANGLE_BINS = 12
 MARGIN = np.deg2rad(3.5)  # electrical, kept from the corners of the trapezoid
 WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
 REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
+JUMP_SPEED = 100.0  # rad/s by which the speed reference jumps in one interval when the command steps
 ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
 COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
 
@@ -196,6 +197,36 @@ def speed_and_acceleration(theta, dt, w, acceleration, slow):
 
 
 @compiled
+def electromagnetic_torque(c, dt, i, theta, out):
+    """Fill k f i summed over the phases (N m), averaged over the very span of ``speed_and_acceleration``.
+
+    A torque and an acceleration that are averaged alike still balance where both change fast.
+    """
+    n_time = theta.shape[0]
+    k, poles = c[2], c[3]
+    half = int(max(0.0, round((2.0 * ORDER_HALF / dt - 1.0) / 2.0)))
+    reach = int(max(1.0, round(5.0e-4 / dt)))
+    total = np.zeros(n_time + 1)
+    for n in range(n_time):
+        angle = poles * (0.5 * (theta[n] + theta[max(n - 1, 0)]))
+        drive = 0.0
+        for j in range(3):
+            drive += k * i[n, j] * trapezoid(angle - AXIS[j], np.pi / 6.0)[0]
+        total[n + 1] = total[n] + drive
+    smooth = np.empty(n_time)
+    for n in range(n_time):
+        low, high = max(0, n - half), min(n_time - 1, n + half)
+        smooth[n] = (total[high + 1] - total[low]) / (high + 1 - low)
+    total[0] = 0.0
+    for n in range(n_time):
+        total[n + 1] = total[n] + smooth[n]
+    for n in range(n_time):
+        low, high = max(0, n - reach), min(n_time - 1, n + reach)
+        inner = total[high + 1] - total[low] - 0.5 * (smooth[low] + smooth[high])
+        out[n] = inner / (high - low)
+
+
+@compiled
 def fill_statistics(
     c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, command, bus, y, norm, count, residual, store
 ):
@@ -213,7 +244,10 @@ def fill_statistics(
     ramp = np.pi / 6.0
     w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
     speed_and_acceleration(theta, dt, w_all, acceleration, slow)
+    torque = np.empty(n_time)
+    electromagnetic_torque(c, dt, i, theta, torque)
     lag = int(max(1.0, round(0.01 / dt)))  # the regulator's residual is differenced over 10 ms: its drift is only noise
+    after_jump = -3 * lag
     regulator = np.zeros(n_time)
     pair_mean = np.zeros(n_time)
     integral, demand = 0.0, 0.0
@@ -237,7 +271,7 @@ def fill_statistics(
             u, v = _MADE_FROM[o, 0], _MADE_FROM[o, 1]
             turn_cos[o] = turn_cos[u] * turn_cos[v] - turn_sin[u] * turn_sin[v]
             turn_sin[o] = turn_sin[u] * turn_cos[v] + turn_cos[u] * turn_sin[v]
-        drive, sum_r, sum_f = 0.0, 0.0, 0.0
+        drive, sum_r, sum_f = torque[n], 0.0, 0.0
         for j in range(3):
             x[j] = _wrap(poles * middle - AXIS[j], TWO_PI)
             if span < 1e-6:
@@ -247,7 +281,6 @@ def fill_statistics(
                 f_mid, slope[j] = trapezoid(x[j], ramp)
                 f_high, _ = trapezoid(x[j] + span, ramp)
                 f[j] = (f_low + 4.0 * f_mid + f_high) / 6.0
-            drive += k * f[j] * i[n, j]
             sum_f += f[j]
             half = x[j] if x[j] < np.pi else x[j] - np.pi
             sign[j] = 1.0 if x[j] < np.pi else -1.0
@@ -374,7 +407,9 @@ def fill_statistics(
                 minus = j
         pair_mean[n] = 0.5 * (i[n, plus] - i[n, minus])
         regulator[n] = pair_mean[n] - before
-        if n > lag + 3 and n < n_time - 1:
+        if abs(command[n] - command[n - 1]) * ratio * K_pos > JUMP_SPEED:
+            after_jump = n  # when within its interval a step came is not recorded
+        if n > lag + 3 and n < n_time - 1 and n > after_jump + 2 * lag:
             r = regulator[n] - regulator[n - lag]
             residual[9, n] = r
             for m in range(3):
