@@ -151,6 +151,7 @@ def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_pa
 
     def digest():
         config.source_digest.cache_clear()
+        config._read_source.cache_clear()
         return config.source_digest(script)
 
     first = digest()
@@ -159,4 +160,3 @@ def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_pa
     assert digest() == first
     (package / "part" / "inner.py").write_text("y = 2\n")
     assert digest() != first
-    config.source_digest.cache_clear()

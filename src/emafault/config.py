@@ -486,15 +486,22 @@ def source_digest(script: str | Path) -> str:
     pending, seen = [Path(script)], {}
     while pending:
         path = pending.pop()
-        if path in seen:
-            continue
-        tree = ast.parse(path.read_text())
-        seen[path] = _meaning(tree)
-        pending += _imports(tree, path)
-    texts = [seen[path] for path in sorted(seen)]
+        if path not in seen:
+            seen[path], imported = _read_source(path)
+            pending += imported
+    digest = hashlib.sha256("".join(seen[path] for path in sorted(seen)).encode())
     if PACKAGE / "effects" / "__init__.py" in seen:
-        texts += [str(OmegaConf.to_container(OmegaConf.load(p))) for p in sorted((CONF / "effect").glob("*.yaml"))]
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
+        for path in sorted((CONF / "effect").glob("*.yaml")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def _read_source(path: Path) -> tuple[str, list[Path]]:
+    """Digest of what a module means and the files of this package that it imports."""
+    tree = ast.parse(path.read_bytes())
+    imported = _imports(tree, path)
+    return hashlib.sha256(_meaning(tree).encode()).hexdigest(), imported
 
 
 def _meaning(tree: ast.AST) -> str:

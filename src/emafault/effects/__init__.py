@@ -1,21 +1,22 @@
 """The catalogue of effects that the nominal actuator leaves out.
 
-Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, nominal value, realistic range and,
-for calibration effects, the tolerance of a unit within its specification) and one term in the compiled physics, which
+Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, nominal value, realistic range
+and, for calibration effects, the tolerance of a unit within its specification) and one term in the compiled physics, which
 reads the field ``<id>_<parameter>`` of the run's record. At the nominal values the nominal actuator is had exactly.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from omegaconf import OmegaConf
+import yaml
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # every process reads the catalogue, and this is fast
 FOLDER = Path(__file__).resolve().parents[3] / "conf" / "effect"
 
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One parameter: units, nominal value (the effect is off), realistic range, tolerance (1 sigma, relative to nominal).
+    """One parameter: units, nominal value (the effect is off), realistic range, tolerance (1 sigma over nominal).
 
     ``follows`` names the actuator's parameter that is the nominal value where the configuration changes it.
     """
@@ -51,8 +52,7 @@ def load_effects(folder: Path = FOLDER) -> dict[str, Effect]:
     """Read the catalogue, in alphabetical order of ids."""
     effects = {}
     for path in sorted(folder.glob("*.yaml")):
-        raw = OmegaConf.to_container(OmegaConf.load(path))
-        assert isinstance(raw, dict)
+        raw = yaml.load(path.read_text(), _LOADER)
         parameters = {str(k): EffectParameter(**v) for k, v in raw["parameters"].items()}
         effects[path.stem] = Effect(path.stem, raw["kind"], tuple(raw["equations"]), parameters)
     return effects
