@@ -1,8 +1,9 @@
 """The catalogue of effects that the nominal actuator leaves out.
 
-Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, nominal value, realistic range
-and, for calibration effects, the tolerance of a unit within its specification) and one term in the compiled physics, which
-reads the field ``<id>_<parameter>`` of the run's record. At the nominal values the nominal actuator is had exactly.
+Each effect is one file ``conf/effect/<id>.yaml`` (kind, equations, parameters with units, nominal value, realistic
+range and, for calibration effects, the tolerance of a unit within its specification) and one term in the compiled
+physics, which reads the field ``<id>_<parameter>`` of the run's record. At the nominal values the nominal actuator is
+had exactly.
 """
 
 from dataclasses import dataclass
