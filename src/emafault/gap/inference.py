@@ -16,6 +16,7 @@ from .twin import Hypothesis, Parameter, Twin
 
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
+LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
 @dataclass(frozen=True)
@@ -255,7 +256,14 @@ class Problem:
         values = np.array([p.off if p.effect else p.mean for p in self.parameters])
         settle = getattr(self.twin, "settle", None)
         best, before = None, np.inf
+        bounds = self.low.copy(), self.high.copy()
+        unit = [m for m in self.nuisances if self.parameters[m].recordings is None]
         for round_ in range(rounds):
+            # the first steps are long: what belongs to the unit stays near its specification until they are done
+            self.low, self.high = bounds[0].copy(), bounds[1].copy()
+            if round_ == 0:
+                self.low[unit] = np.maximum(self.low[unit], self.mean[unit] - LEASH * self.sd[unit])
+                self.high[unit] = np.minimum(self.high[unit], self.mean[unit] + LEASH * self.sd[unit])
             if round_ < 2:
                 if settle is not None:
                     settle(values, self.part)
@@ -267,7 +275,7 @@ class Problem:
             shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
             values = best.values
             near = 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells)
-            if round_ > 0 and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
+            if round_ > 1 and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
                 break
             before = best.objective if round_ > 0 else np.inf
         assert best is not None
