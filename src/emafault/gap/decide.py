@@ -24,6 +24,7 @@ class Calibration:
 
     gap: tuple[float, ...]
     right: tuple[float, ...]
+    confirm: tuple[float, ...]  # added to the log odds of the second curve once the confirm recordings are open
     addition: float
     remainder: float  # largest family excess that an explained bench may leave
     source: str = ""
@@ -96,6 +97,14 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
     return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
 
 
+def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarray | None:
+    """(1, log share left) of the confirm recordings' excess misfit; None where they show no gap beyond noise."""
+    visible = recalibrated**2 - 1.0
+    if visible < 4.0 * np.sqrt(2.0 / max(size, 1)) * max(recalibrated**2, 1.0):
+        return None
+    return np.array([1.0, np.log10(np.clip(max(after**2 - 1.0, 0.0) / visible, 1e-3, 10.0))])
+
+
 def _sigmoid(x: float) -> float:
     return float(1.0 / (1.0 + np.exp(-np.clip(x, -30.0, 30.0))))
 
@@ -112,14 +121,23 @@ class Decision:
     evidence: Evidence
 
 
-def decide(problem: Problem, found: Search, hypotheses: Sequence, calibration: Calibration) -> Decision:
-    """Turn a search into a verdict by the frozen curves."""
+def decide(
+    problem: Problem,
+    found: Search,
+    hypotheses: Sequence,
+    calibration: Calibration,
+    held_out: np.ndarray | None = None,
+) -> Decision:
+    """Turn a search into a verdict by the frozen curves; ``held_out`` are the features of the confirm recordings."""
     evidence, group = evidence_of(problem, found)
     p_gap = _sigmoid(float(np.dot(calibration.gap, evidence.gap_features())))
     if not found.candidates:
         unknown = p_gap
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
-    p_right = _sigmoid(float(np.dot(calibration.right, evidence.right_features())))
+    odds = float(np.dot(calibration.right, evidence.right_features()))
+    if held_out is not None:
+        odds += float(np.dot(calibration.confirm, held_out))
+    p_right = _sigmoid(odds)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()
     sets = [(c, float(p_gap * p_right * w)) for c, w in zip(group, weights, strict=True)]

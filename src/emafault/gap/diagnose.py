@@ -3,11 +3,11 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from .decide import Calibration, Decision, decide, is_named
+from .decide import Calibration, Decision, decide, held_out_features, is_named
 from .how_far import Ladder, climb, closed
 from .inference import Candidate, Point, Problem
 from .twin import Twin
@@ -76,6 +76,17 @@ def diagnose(
     verdict["digest"] = hashlib.sha256(json.dumps(verdict, sort_keys=True).encode()).hexdigest()[:16]
     # from here on the confirm recordings are open
     ladder = climb(twin, confirm, problem, found.null, best) if confirm else None
+    sealed, held_out = verdict["verdict"], None
+    if ladder is not None and best is not None:
+        held_out = held_out_features(ladder.recalibrated.rms, ladder.after.rms, len(ladder.problem.cells))
+        decision = decide(problem, found, hypotheses, calibration, held_out)
+        verdict["verdict"] = decision.verdict
+        verdict["which"] = _which(twin, problem, found, decision, by_id)
+    verdict["before_confirm"] = sealed
+    verdict["evidence"] = asdict(decision.evidence) | {
+        "held_out": None if held_out is None else [float(x) for x in held_out],
+        "candidates": [[list(c.effects), round(c.gain, 2)] for c in found.candidates[:6]],
+    }
     mixture = _mixture(problem, found, decision, best)
     before_faults = fault_vectors(problem, found.null, ladder and (ladder.problem, ladder.recalibrated.values))
     after_faults = fault_vectors(problem, after, ladder and (ladder.problem, ladder.after.values), mixture)

@@ -13,7 +13,6 @@ from scipy.linalg import solve_triangular
 
 from .twin import Hypothesis, Parameter, Twin
 
-
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit

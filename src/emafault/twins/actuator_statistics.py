@@ -431,6 +431,11 @@ def fill_statistics(
                     _put(base + 3, n, 1.0, share, y, norm, count, store)
     for m in range(y.shape[0]):
         y[m] /= np.sqrt(norm[m])
+    if not has_end:
+        # mean currents cannot give di/dt across a switching ripple: what is regressed on it says nothing
+        for j in range(3):
+            for m in (3, 4, 16):
+                count[j * _PER_PHASE + m] = 0
     # lattice of a rounded speed: the spacing of its values where values repeat, else zero
     ordered = np.sort(speed)
     distinct, spacing = 1, 1.0e9

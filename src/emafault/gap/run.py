@@ -1,0 +1,270 @@
+"""A whole diagnosis: recordings in; verdict, report, experiment and tracking out."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..actuator.sensors import SensorNoise
+from ..effects import EFFECTS
+from ..errors import InputError
+from ..progress import say
+from ..recording import replace_atomically
+from .bench import Bench, read_bench, split_bench
+from .decide import Calibration
+from .diagnose import Diagnosis, diagnose
+from .words import summary
+
+VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
+THREADS = 2
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """One diagnosis with what its report needs: true faults where known, the fix as an experiment's text."""
+
+    diagnosis: Diagnosis
+    truths: Mapping[str, np.ndarray]
+    region: Any = None
+    experiment: str = ""
+
+    @property
+    def verdict(self) -> dict:
+        """The verdict as written."""
+        return self.diagnosis.verdict
+
+
+def diagnose_path(
+    path: str | Path,
+    spec: Mapping[str, Any],
+    out: str | Path | None = None,
+    twin: str = "actuator",
+    exclude: Sequence[str] = (),
+    experiment: str | Path | None = None,
+    track: bool = True,
+) -> dict[str, dict]:
+    """Diagnose a bench and write what was found.
+
+    Parameters
+    ----------
+    path : folder of recordings, or what the twin of a measured machine reads
+    spec : ``actuator``, ``sensors`` and ``tracking`` of a composed configuration
+    out : folder to write to; None takes ``results/diagnoses/<name of the bench>``
+    twin : ``actuator`` or the name of a measured machine's twin
+    exclude : effects that the library is to lack
+    experiment : file that receives the fix as an experiment, besides the one among the results
+    track : whether to log an MLflow run; one that fails is said so and breaks nothing
+
+    Returns
+    -------
+    the verdict of each case; a bench of the actuator is one case
+
+    Raises
+    ------
+    InputError : a bench, twin or effect that cannot be used, or results that cannot be written
+    """
+    path = Path(path)
+    name = path.resolve().name if path.is_dir() else path.stem
+    folder = Path(out) if out is not None else results_folder() / "diagnoses" / name
+    if twin == "actuator":
+        cases = {name: diagnose_bench(path, spec, exclude)}
+    else:
+        cases = diagnose_measured(path, twin, exclude)
+    for case, found in cases.items():
+        write_case(folder if len(cases) == 1 else folder / _file_name(case), found)
+        if found.experiment and experiment is not None:
+            _write(Path(experiment), found.experiment)
+    if len(cases) > 1:
+        _write(
+            folder / VERDICT, to_json({"bench": name, "twin": twin, "cases": {c: f.verdict for c, f in cases.items()}})
+        )
+        _write_contents(folder, name, list(cases))
+    for found in cases.values():
+        print(summary(found.verdict))
+    print(f"written to {folder}")
+    if track:
+        for case, found in cases.items():
+            _track(spec["tracking"], folder if len(cases) == 1 else folder / _file_name(case), found.verdict)
+    return {case: found.verdict for case, found in cases.items()}
+
+
+def results_folder() -> Path:
+    """``results`` here, else the project's."""
+    here = Path("results")
+    return here if here.is_dir() else Path(__file__).resolve().parents[3] / "results"
+
+
+# --- the two kinds of machine ----------------------------------------------------------------------------------------
+
+
+def diagnose_bench(path: Path, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> Diagnosed:
+    """Read, split and diagnose a bench of the reference actuator, without writing anything.
+
+    Raises
+    ------
+    InputError : recordings or effects that cannot be used
+    """
+    actuator = ActuatorParameters(**spec["actuator"])
+    return diagnose_recordings(read_bench(path, actuator), actuator, SensorNoise(**spec["sensors"]), exclude)
+
+
+def diagnose_recordings(
+    bench: Bench,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    exclude: Sequence[str] = (),
+    calibration: Calibration | None = None,
+    whole: bool = True,
+) -> Diagnosed:
+    """Diagnose a bench that has been read and checked.
+
+    Parameters
+    ----------
+    noise : of the sensors, where the recordings do not tell it
+    calibration : frozen curves of probability; None takes those of the project
+    whole : with the ladder in features, the next experiments and the pictures; a withheld check needs none of them
+
+    Raises
+    ------
+    InputError : an excluded effect that does not exist
+    """
+    from ..twins import actuator_experiments
+    from ..twins.actuator import ActuatorTwin
+    from ..twins.actuator_features import feature_ladder
+    from ..twins.actuator_pictures import worst_region
+    from .handover import experiment_text
+    from .held_out import held_out
+    from .next_experiment import next_experiments
+
+    for effect in exclude:
+        if effect not in EFFECTS:
+            raise InputError(f"exclude: '{effect}' is not an effect, accepted are {', '.join(EFFECTS)}")
+    recordings = bench.recordings
+    explore, confirm = split_bench(recordings)
+    truths = {n: r.fault for n, r in recordings.items() if r.fault is not None}
+    twin = ActuatorTwin(actuator, recordings, noise, tuple(exclude), THREADS)
+    found = diagnose(twin, bench.name, explore, confirm, calibration or Calibration.load(), truths)
+    verdict = found.verdict
+    verdict["warnings"] = bench.warnings
+    verdict.setdefault("held_out", held_out(found))
+    if not whole:
+        return Diagnosed(found, truths)
+    verdict["shrinks"]["features"] = feature_ladder(found)
+    verdict["next_experiment"] = next_experiments(found, actuator_experiments)
+    named = verdict["verdict"] in ("explained", "group", "partly")
+    best = found.found.candidates[0] if named else None
+    values = best.point.values if best is not None else found.found.null.values
+    effects = actuator_experiments.catalogue_effects(twin, values, best.effects if best is not None else ())
+    text = experiment_text(verdict, effects, f"diagnosed_{_file_name(bench.name)}")
+    return Diagnosed(found, truths, worst_region(found), text)
+
+
+def diagnose_measured(path: Path, twin: str, exclude: Sequence[str] = ()) -> dict[str, Diagnosed]:
+    """Diagnose every case of a measured machine's file or folder.
+
+    Raises
+    ------
+    InputError : a twin, file or effect that cannot be used
+    """
+    from ..twins.diagnosed import diagnose_cases
+
+    if exclude:
+        raise InputError("--exclude: effects can be left out of the actuator's library only")
+    cases = diagnose_cases(twin, path, Calibration.load())
+    for found in cases.values():
+        found.verdict.setdefault("warnings", [])
+    return {case: Diagnosed(found, {}) for case, found in cases.items()}
+
+
+# --- what is written -------------------------------------------------------------------------------------------------
+
+
+def write_case(folder: Path, found: Diagnosed) -> None:
+    """Write verdict, report and, where there is one, the experiment of one diagnosis.
+
+    Raises
+    ------
+    InputError : a file that cannot be written
+    """
+    from .report import write_report
+    from .retrained import section
+
+    _write(folder / VERDICT, to_json(found.verdict))
+    if found.experiment:
+        _write(folder / EXPERIMENT, found.experiment)
+    write_report(found.diagnosis, folder / REPORT, found.truths, found.region, section(folder, found.verdict))
+
+
+def to_json(value: Any) -> str:
+    """Plain JSON; numbers that JSON has not (NaN, infinity) become null."""
+    return json.dumps(_plain(value), indent=1, allow_nan=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(v) for v in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def _write(path: Path, text: str) -> None:
+    replace_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _file_name(text: str) -> str:
+    """Text as the name of a file and of an experiment."""
+    kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
+    return kept.lstrip("_-") or "bench"
+
+
+def _write_contents(folder: Path, name: str, cases: Sequence[str]) -> None:
+    from ..figures.page import Page
+
+    page = Page(f"Diagnoses of {name}")
+    links = "".join(f'<li><a href="{_file_name(c)}/{REPORT}">{c}</a></li>' for c in cases)
+    page.parts.append(f"<ul>{links}</ul>")
+    page.write(folder / REPORT)
+
+
+def _track(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
+    """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
+    from ..tracking import Entry, log_run
+
+    first = verdict["which"][0]
+    metrics = {"probability": first["probability"]}
+    for kind, rung in verdict["shrinks"].items():
+        metrics |= {f"{kind}.{k}": v for k, v in (rung or {}).items() if v is not None}
+    for name, p in first.get("parameters", {}).items():
+        metrics[f"parameter.{name}"] = p["value"]
+    entry = Entry(
+        verdict["bench"],
+        parameters={
+            "verdict": verdict["verdict"],
+            "effects": "+".join(first["effects"]) or "no_gap",
+            "twin": verdict["twin"],
+            "recordings": verdict["recordings"],
+            "digest": verdict["digest"],
+        },
+        metrics=metrics,
+        tags={"stage": "diagnosis", "bench": verdict["bench"]},
+        files={path: "" for path in (folder / VERDICT, folder / REPORT) if path.exists()},
+    )
+    try:
+        uri = tracking["uri"]
+        if uri.startswith("sqlite:///results/"):
+            uri = f"sqlite:///{results_folder() / uri.removeprefix('sqlite:///results/')}"
+        log_run(uri, tracking["experiment"], entry)
+    except Exception as error:
+        say(f"not tracked: {' '.join(str(error).split())[:200]}")

@@ -1,0 +1,124 @@
+"""Diagnoses of blind cases, for the withheld check and for calibrating the probabilities.
+
+The cases' generator and the diagnoser do not know each other; they meet here. A diagnosis sees a bench's folder and, on the rung
+that leaves an effect out, which one the library lacks.
+"""
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ..actuator.parameters import ActuatorParameters
+from ..actuator.sensors import SensorNoise
+from ..gap.bench import read_bench, split_bench
+from ..gap.decide import Calibration
+from ..gap.diagnose import diagnose
+from ..recording import replace_atomically
+from ..twins.actuator import ActuatorTwin
+from ..withheld.benches import make_cases
+from ..withheld.cases import draw_case
+
+#: cases of the development draw stand above this seed, those of the scoreboard below
+DEVELOPMENT = 1_000_000
+
+
+def run_cases(
+    rung: str,
+    seeds: Iterable[int],
+    folder: Path,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    calibration: Calibration,
+    keep_benches: bool = False,
+) -> list[str]:
+    """Make, diagnose and keep the verdicts of a rung's seeds; what is there already is left alone.
+
+    ``FOLDER/keys`` and ``FOLDER/diagnoses/NAME/diagnosis.json`` stay; the recordings go once they are diagnosed.
+
+    Returns
+    -------
+    names of the cases
+    """
+    names = []
+    for seed in seeds:
+        case = draw_case(rung, seed)
+        names.append(case.name)
+        out = folder / "diagnoses" / case.name / "diagnosis.json"
+        if out.exists() and (folder / "keys" / f"{case.name}.json").exists():
+            continue
+        make_cases(rung, [seed], folder, actuator, noise)
+        bench = folder / "benches" / case.name
+        if not bench.exists():
+            (folder / "keys" / f"{case.name}.json").unlink()
+            make_cases(rung, [seed], folder, actuator, noise)
+        verdict = diagnose_bench(bench, actuator, noise, calibration, case.left_out)
+        text = json.dumps(verdict, indent=1)
+        replace_atomically(out, lambda temporary, text=text: temporary.write_text(text))
+        if not keep_benches:
+            for file in bench.glob("*.nc"):
+                file.unlink()
+            bench.rmdir()
+    return names
+
+
+def diagnose_bench(
+    bench: Path,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    calibration: Calibration,
+    exclude: Sequence[str] = (),
+    threads: int = 1,
+) -> dict:
+    """The verdict on a bench by the reference actuator's twin, without report or next experiment."""
+    brought = read_bench(bench, actuator)
+    explore, confirm = split_bench(brought.recordings)
+    twin = ActuatorTwin(actuator, brought.recordings, noise, exclude, threads)
+    return diagnose(twin, brought.name, explore, confirm, calibration).verdict
+
+
+def calibrate(folder: Path, start: Calibration) -> Calibration:
+    """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
+
+    Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case held a
+    detectable gap, the second on whether the best set was right among cases that did.
+    """
+    gap_rows, gap_truth, right_rows, right_truth = [], [], [], []
+    for path in sorted((folder / "keys").glob("*.json")):
+        verdict_path = folder / "diagnoses" / path.stem / "diagnosis.json"
+        if not verdict_path.exists():
+            continue
+        key, verdict = json.loads(path.read_text()), json.loads(verdict_path.read_text())
+        truth = set(key["case"]["effects"])
+        distance = (key["detectability"] or {}).get("nominal", 0.0)
+        e = verdict["evidence"]
+        gain, excess = np.log1p(max(e["gain"], 0.0)), np.log1p(max(e["null_excess"], 0.0))
+        if not truth or distance >= 25.0:
+            gap_rows.append([1.0, gain, excess])
+            gap_truth.append(bool(truth))
+        if not e["candidates"] or (truth and distance < 25.0):
+            continue
+        best = set(e["candidates"][0][0])
+        right = best == truth and not key["case"]["left_out"]
+        held = e["held_out"] or [0.0, 0.0]
+        unexplained = np.log10(max(e["unexplained"], 1e-5))
+        margin = np.log1p(max(e["margin"], 0.0))
+        right_rows.append([1.0, gain, np.log1p(max(e["excess"], 0.0)), unexplained, margin, *held])
+        right_truth.append(right)
+    gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap))
+    both = _logistic(np.array(right_rows), np.array(right_truth), np.array([*start.right, *start.confirm]))
+    size = len(start.right)
+    source = f"{len(gap_rows)} development cases for the first curve, {len(right_rows)} for the second"
+    return Calibration(tuple(gap), tuple(both[:size]), tuple(both[size:]), start.addition, start.remainder, source)
+
+
+def _logistic(rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, width: float = 2.0) -> list[float]:
+    """Coefficients (feature,) by maximum a posteriori about ``centre``."""
+    sign = np.where(truth, 1.0, -1.0)
+
+    def loss(w: np.ndarray) -> float:
+        return float(np.logaddexp(0.0, -sign * (rows @ w)).sum() + 0.5 * np.square((w - centre) / width).sum())
+
+    return [round(float(x), 4) for x in minimize(loss, centre, method="BFGS").x]
