@@ -179,3 +179,14 @@ def test_onnx_takes_si_and_equals_torch_and_the_network(fitted, fresh, tmp_path)
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     (got,) = session.run(None, {"features": fresh.features[:3].astype(np.float32)})  # another number of rows
     np.testing.assert_allclose(got[:, 5], network.predict(fresh.features[:3])[:, 5], atol=0.01)
+
+
+def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fresh, training, actuator, width):
+    bias = np.array([1.06, 1.06, 1.06, 0.9, 0.9, 0.9])
+    biased = training.features * bias
+    fit = fit_identifier("network", biased, training.faults, actuator, intervals="split", **SETTINGS)
+    unit = nominal_features(actuator) * np.repeat([1.01, 0.995], 3)
+    off = evaluation.FeatureSet(fresh.features * bias * np.repeat([1.01, 0.995], 3), fresh.faults)
+    straight = evaluation.evaluate(fit.identifier, evaluation.FeatureSet(fresh.features * bias, fresh.faults), width)
+    calibrated = evaluation.evaluate(fit.identifier, off, width, unit=unit * bias)
+    assert calibrated["errors"]["dT"]["mae"] < 1.1 * straight["errors"]["dT"]["mae"]

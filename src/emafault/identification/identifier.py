@@ -39,6 +39,7 @@ class Identifier:
     network: Network | None = None  # None: the closed form
     feature_low: np.ndarray | None = None  # (feature,) range of the rows learnt from
     feature_high: np.ndarray | None = None
+    healthy: np.ndarray | None = None  # (6,) R and k that it takes for healthy at 20 degC; None: the nominal ones
 
     @property
     def estimator(self) -> str:
@@ -118,7 +119,7 @@ class Identifier:
             covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), 6, 6))
         if unit is not None:
             unit = np.broadcast_to(np.asarray(unit, float), (len(features), 6))
-            scale = nominal_features(self.actuator) / unit
+            scale = (nominal_features(self.actuator) if self.healthy is None else self.healthy) / unit
             features = np.concatenate([features[:, :6] * scale, features[:, 6:]], axis=1)
             if covariance is not None:
                 covariance = covariance * scale[:, :, None] * scale[:, None, :]
@@ -145,6 +146,7 @@ class Identifier:
             "network": self.network.to_plain() if self.network else None,
             "feature_low": None if self.feature_low is None else self.feature_low.tolist(),
             "feature_high": None if self.feature_high is None else self.feature_high.tolist(),
+            "healthy": None if self.healthy is None else self.healthy.tolist(),
         }
         replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
 
@@ -172,6 +174,7 @@ class Identifier:
                 Network.from_plain(plain["network"]) if plain["network"] else None,
                 None if low is None else np.array(low),
                 None if high is None else np.array(high),
+                None if plain.get("healthy") is None else np.array(plain["healthy"]),
             )
         except (ValueError, KeyError, TypeError) as error:
             if isinstance(error, InputError):
@@ -182,6 +185,26 @@ class Identifier:
 def nominal_features(actuator: ActuatorParameters) -> np.ndarray:
     """R0 and k0 of the nominal actuator as six features."""
     return np.repeat([actuator.resistance, actuator.back_emf], 3)
+
+
+def learnt_healthy(
+    features: np.ndarray, faults: np.ndarray, actuator: ActuatorParameters, alpha_m: float, lag: float
+) -> np.ndarray:
+    """(6,) R and k of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
+
+    A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
+    as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
+    differs from 1 by more than chance; of the laws with and without xi in k the one that fits better.
+    """
+    nominal = nominal_features(actuator)
+    ratios = []
+    for law in ("stator_fixed", "rotor_angle"):
+        true = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
+        ratios.append(features[:, :6] / np.concatenate(true, axis=1))
+    ratio = min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
+    bias = np.mean(ratio, axis=0)
+    chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
+    return nominal * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
 
 
 def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
@@ -274,7 +297,8 @@ def fit_identifier(
     trained = None
     if estimator == "network":
         trained = train(features, faults, network, training, seed)
-        identifier = replace(identifier, network=trained.network)
+        healthy = learnt_healthy(features, faults, actuator, alpha_m, lag)
+        identifier = replace(identifier, network=trained.network, healthy=healthy)
 
     def residuals_of(model: Identifier, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         part = None if covariance is None else covariance[rows]
