@@ -401,6 +401,11 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     return recursively_sorted(identification_spec(config) | spec)
 
 
+def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What diagnosing a bench reads."""
+    return recursively_sorted(_pick(config, "actuator", "sensors", "tracking"))
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.

@@ -1,22 +1,47 @@
 """``emafault diagnose``: a bench of recordings -> a verdict, by the twin of the machine it was recorded on."""
 
 import argparse
+from pathlib import Path
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="PATH", help="bench: a folder of recordings, or a file that the twin reads")
+    parser.add_argument(
+        "overrides",
+        nargs="*",
+        metavar="OVERRIDE",
+        help="Hydra overrides of the nominal actuator, as actuator.gear_ratio=400",
+    )
     parser.add_argument("--out", metavar="DIR", help="folder to write to (results/diagnoses/<name of the bench>)")
     parser.add_argument("--twin", default="actuator", metavar="NAME", help="machine the bench comes from (actuator)")
+    parser.add_argument(
+        "--exclude", nargs="+", default=[], metavar="EFFECT", help="effects to leave out of the library"
+    )
+    parser.add_argument(
+        "--experiment", metavar="NAME", help="write the fix as conf/experiment/NAME.yaml too, for snakemake to run"
+    )
+    parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
 
 def run(args: argparse.Namespace) -> None:
-    """Diagnose and write ``diagnosis.json`` and ``report.html``.
+    """Diagnose and write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
     Raises
     ------
-    InputError : recordings or a twin that cannot be used
+    InputError : recordings, a twin or a setting that cannot be used
     """
-    from ..gap.diagnose import diagnose_path
+    from .. import config
+    from ..errors import InputError
+    from ..gap.run import diagnose_path
 
-    diagnose_path(args.path, out=args.out, twin=args.twin)
+    target = None
+    if args.experiment:
+        if not args.experiment.replace("_", "").replace("-", "").isalnum():
+            raise InputError(f"--experiment: got '{args.experiment}', accepted are letters, digits, _ and -")
+        target = config.CONF / "experiment" / f"{args.experiment}.yaml"
+    spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
+    tracking = not args.no_tracking
+    diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
+    if target is not None:
+        print(f"snakemake --cores all --config experiment={Path(target).stem}")

@@ -302,7 +302,7 @@ def _statistics(page: Page, diagnosis: Diagnosis) -> None:
 def _region_caption(region: Any) -> str:
     return (
         f"Recording {region.recording}, equation {region.equation.replace('_', ' ')}, statistic '{region.statistic}'. "
-        "Left: the residual of the equation with nominal parameters. Right: signals where the misfit is largest; switching "
+        "Left: the residual with nominal parameters. Right: signals where the misfit is largest; switching "
         "loops drift apart sample by sample even with identical physics, so compare shapes, not traces."
     )
 

@@ -1,0 +1,151 @@
+"""A verdict in plain words: the finding, its certainty, and what these recordings cannot tell."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+#: excess of a family from which "clearly" is said
+_CLEAR = 10.0
+
+
+def effect_words(effects: Sequence[str]) -> str:
+    """Effects in words: ``friction asymmetry and load constant``."""
+    names = [e.replace("_", " ") for e in effects]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "nothing"
+
+
+def number(value: float) -> str:
+    """A value to three digits."""
+    return f"{value:.3g}"
+
+
+def parameter_words(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """Parameters with units and 90 % intervals."""
+    parts = []
+    for name, p in parameters.items():
+        units = "" if p["units"] == "1" else f" {p['units']}"
+        parts.append(f"{name} = {number(p['value'])}{units} ({number(p['low'])} to {number(p['high'])})")
+    return ", ".join(parts)
+
+
+def finding(verdict: Mapping[str, Any]) -> str:
+    """The finding and its certainty, in two or three sentences."""
+    first = verdict["which"][0]
+    kind, where = verdict["verdict"], verdict["where"]
+    if kind == "no_gap":
+        text = (
+            f"The nominal simulator reproduces these recordings within the unit's tolerances (probability "
+            f"{_percent(first['probability'])}); no effect needs to be added."
+        )
+        seen = [w for w in where if w["z"] > _CLEAR]
+        return text + (f" What is left is largest in {_place(seen[0])}." if seen else "")
+    if kind == "unknown":
+        text = (
+            f"The simulator and these recordings differ, and nothing in the library explains it (probability "
+            f"{_percent(first['probability'])} that the cause is not in the library)."
+        )
+        return text + (f" The difference is largest in {_place(where[0])}." if where else "")
+    names = effect_words(first["effects"])
+    if kind == "group":
+        members = [e for e in verdict["which"] if e.get("group")]
+        total = sum(e["probability"] for e in members)
+        listed = " or ".join(effect_words(e["effects"]) for e in members)
+        text = (
+            f"One of these explains the gap, these recordings cannot say which: {listed} (together {_percent(total)})."
+        )
+    else:
+        text = f"{names[0].upper()}{names[1:]} explains the gap with probability {_percent(first['probability'])}: "
+        text += f"{parameter_words(first['parameters'])}."
+    if kind == "partly":
+        remains = verdict.get("remains") or []
+        text += " A remainder stays unexplained" + (f", largest in {_place(remains[0])}." if remains else ".")
+    return text + _held_out(verdict)
+
+
+def _held_out(verdict: Mapping[str, Any]) -> str:
+    """What the confirm recordings say of a named set."""
+    signal = verdict["shrinks"]["signal"]
+    if signal is None:
+        return " No recording was held out, so nothing confirms it."
+    before, after, placebo = signal["recalibrated"], signal["after"], signal["placebo"]
+    figures = f"the misfit falls from {number(before)} to {number(after)} times the noise"
+    figures += f" (a random effect: {number(placebo)})"
+    outcome = verdict.get("held_out", {}).get("outcome", "holds")
+    if outcome == "contradicted":
+        return (
+            " The recordings that took no part contradict it: there the misfit goes from "
+            f"{number(before)} to {number(after)} times the noise, so it is not claimed."
+        )
+    if outcome == "not seen":
+        return " The recordings that took no part show too little of the gap to confirm or refute it."
+    if outcome == "rival":
+        kept = verdict["held_out"]["claimed"]
+        left = f"only {effect_words(kept)} is claimed" if kept else "nothing is claimed"
+        return f" On recordings that took no part another set does better; {left}."
+    return f" On recordings that took no part {figures}."
+
+
+def consequence(verdict: Mapping[str, Any]) -> str:
+    """What the gap does to the identified fault."""
+    biased = verdict.get("biased_outputs") or {}
+    if not biased or verdict["verdict"] in ("no_gap", "unknown"):
+        return ""
+    parts = [f"{name} by {number(value)}{' K' if name == 'dT' else ''}" for name, value in sorted(biased.items())]
+    return f"Left out of the simulator, it shifts the identified fault: {', '.join(parts)}."
+
+
+def cannot_tell(verdict: Mapping[str, Any], hidden: Mapping[str, float] | None = None) -> list[str]:
+    """What these recordings cannot tell, one sentence each.
+
+    Parameters
+    ----------
+    hidden : effects that would not have shown -> smallest visible size over the prior's width
+    """
+    out = [w["message"] for w in verdict.get("warnings", [])]
+    for group in verdict["groups"]:
+        out.append(f"Leave the same trace here: {effect_words(group)}.")
+    named = {e for entry in verdict["which"][:1] for e in entry["effects"]}
+    for pair in verdict.get("confusable", []):
+        if named & set(pair["effects"]) and set(pair["effects"]) not in [set(g) for g in verdict["groups"]]:
+            out.append(f"Hard to tell apart here: {effect_words(pair['effects'])} (cosine {pair['cosine']:.2f}).")
+    if hidden:
+        detail = []
+        for effect in sorted(hidden, key=lambda e: -hidden[e])[:6]:
+            entry = verdict["detectable_from"][effect]
+            detail.append(f"{effect.replace('_', ' ')} ({entry['parameter']} below {number(entry['size'])})")
+        out.append("Would hardly have shown: " + ", ".join(detail) + ".")
+    return out
+
+
+def summary(verdict: Mapping[str, Any]) -> str:
+    """The few lines that the command prints."""
+    explore, confirm = verdict["recordings"]["explore"], verdict["recordings"]["confirm"]
+    lines = [f"{verdict['bench']}: {verdict['verdict']} ({len(explore)} recordings explored, {len(confirm)} confirmed)"]
+    lines.append(f"  {finding(verdict)}")
+    text = consequence(verdict)
+    if text:
+        lines.append(f"  {text}")
+    for entry in verdict["which"]:
+        if entry["probability"] >= 0.005:
+            label = "+".join(entry["effects"]) or "no gap"
+            lines.append(f"  {100 * entry['probability']:5.1f} %  {label}")
+    for entry in verdict.get("warnings", []):
+        if entry["kind"] == "set aside":
+            lines.append(f"  {entry['message']}")
+    for entry in verdict["next_experiment"][:1]:
+        lines.append(f"  next: {entry['command']}, at {entry['ambient_temperature']:g} degC")
+    return "\n".join(lines)
+
+
+def _percent(probability: float) -> str:
+    return "over 99.9 %" if probability > 0.999 else f"{100 * probability:.3g} %"
+
+
+def _place(entry: Mapping[str, Any]) -> str:
+    """One entry of ``where`` in words."""
+    along = entry["along"].replace("_", " ")
+    span = ""
+    if entry["from"] != entry["to"]:
+        span = f" from {number(entry['from'])} to {number(entry['to'])}"
+    elif entry["along"] == "order":
+        span = f" {number(entry['from'])}"
+    return f"the equation {entry['equation'].replace('_', ' ')}, along {along}{span}"
