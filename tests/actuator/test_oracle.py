@@ -1,4 +1,4 @@
-"""Two simulators of the same page, written apart, must give the same statistics: nominal, faulted and with every effect."""
+"""Two simulators written apart must give the same statistics: nominal, faulted and with every effect."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,9 @@
-"""The same actuator written a second time, on a fixed step: the oracle of the tests and the other integrator of blind cases.
+"""The same actuator written a second time, on a fixed step: oracle of the tests, other integrator of blind cases.
 
-Nothing here is shared with the event-driven simulation but the run record. Inside a step only the free-wheel current's zero
-and the comparator's trips are hit exactly; everything else is rounded to the step. Every effect also has an alternative *form*
-(LuGre friction for Stribeck, a two-node thermal network, a rounded back-EMF table, ...), for cases in which the library's
-formula is not the truth.
+Nothing here is shared with the event-driven simulation but the run record. Inside a step only the free-wheel current's
+zero and the comparator's trips are hit exactly; everything else is rounded to the step. Every effect also has an
+alternative *form* (LuGre friction for Stribeck, a two-node thermal network, a rounded back-EMF table, ...), for cases
+in which the library's formula is not the truth.
 """
 
 from collections.abc import Collection
@@ -360,7 +360,7 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
                     base[off] = -Vf if diode[off] > 0.0 else bus + Vf
                 tau = left
                 _advance(i, tau, base, Rds, R, L, s, smooth, e, conducts, k1, middle, k2, new)
-                # each event shortens the step to its own crossing; the earlier of two is found by doing one after the other
+                # each event shortens the step to its own crossing, so that the earlier of two is what remains
                 ended = False
                 if diode[off] != 0.0 and diode[off] * new[off] < 0.0:
                     ended = True

@@ -20,6 +20,8 @@ from ..recording import Recording, replace_atomically, write_recording
 from .cases import Case, case_from_dict, draw_case
 from .detectability import Detector
 
+STEP = 2e-6  # s, of the other integrator
+
 
 def make_cases(
     rung: str,
@@ -61,7 +63,7 @@ def simulate_truth(case: Case, actuator: ActuatorParameters) -> list[dict[str, n
         runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
         command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
         if case.forms:
-            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, forms=case.forms)
+            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, STEP, case.forms)
         else:
             signals = simulate(runs, command, plan.duration, plan.interval)
         out.append(signals)
@@ -124,7 +126,7 @@ def near_rivals(effect: str) -> list[str]:
 
 
 def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
-    """Squared distances from a case's truth to the nearest point of other effects, simulated again from the key alone."""
+    """Squared distances from a case's truth to the nearest point of other effects, simulated from the key alone."""
     wanted = list(rivals)
     if not wanted:
         return {}

@@ -1,7 +1,7 @@
-"""How visible a truth is: squared distances in noise units between what a bench shows and what other explanations would show.
+"""How visible a truth is: squared distances in noise units between what a bench shows and what other causes would show.
 
-Written apart from the diagnosis, with statistics of its own: interval sums of the residuals that the nominal parameters leave
-in the phase, torque, position and bus equations, sorted by rotor angle, direction, speed and time. All are linear in
+Written apart from the diagnosis, with statistics of its own: sums of the residuals that the nominal parameters leave in
+the phase, torque, position and bus equations, sorted by rotor angle, direction, speed and time. All are linear in
 per-sample features, so that their noise covariance is exact; what two runs of the same physics differ by (switching) is
 measured and added. Distances are marginal over the nuisances: unit tolerances, soak temperatures and faults.
 """
@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 
 from ..actuator.commands import command_positions
@@ -27,6 +27,9 @@ LATTICE = 1e6  # squared distance by which rounded values differ from unrounded 
 START, SLOW, MARGIN = 0.05, 3.0, 0.01  # s, rad/s, s
 MIN_VISITS = 10.0  # samples
 LAG = 5e-3  # s, scatter of one sample's view of how late the current follows its reference
+PLAIN = 5e3  # above it a squared distance to the nominal model is not refined
+SCATTER = 2.0  # half would be one run's variance; derivatives carry the scatter of several
+STRIDE = 1.5  # largest step of a nuisance
 FAR = 5.0  # no nuisance further than this, in prior standard deviations
 SOAK = 0.5  # K, prior of the soak temperature
 FAULT_PRIOR = np.array([0.05, 0.05, 0.05, 0.1, 0.1])
@@ -39,10 +42,11 @@ def simulate_plan(
     plan: RecordingPlan,
     units: Sequence[Unit],
     faults: np.ndarray,
-    theta_0: np.ndarray | float,
+    band: np.ndarray | float = 1.0,
 ) -> dict[str, np.ndarray]:
-    """Simulate one recording for a batch of units and (run, 6) faults, without noise."""
-    runs = make_runs(actuator, faults, theta_0=theta_0)
+    """Simulate one recording for a batch of units and (run, 6) faults, noise-free; ``band`` scales the hysteresis."""
+    runs = make_runs(actuator, faults, theta_0=plan.theta_0)
+    runs["hysteresis"] *= band
     for row, unit in enumerate(units):
         for effect, values in unit.items():
             for name, value in values.items():
@@ -199,7 +203,7 @@ class View:
                 out[kind].append(self._scale(kind, power) * values)
         return {kind: np.array(values) for kind, values in out.items()}
 
-    def prepare(self, scatter: Mapping[str, np.ndarray]) -> None:
+    def prepare(self, scatter: Mapping[str, float]) -> None:
         """Noise covariance of each kind; ``scatter`` is the variance from switching (the same physics twice)."""
         a, s, dt = self.actuator, self.sigma, self.plan.interval
         slope = a.inductance / dt * (s["current_end"] if self.case.end_current else a.hysteresis)
@@ -307,13 +311,11 @@ class Detector:
                 moved.append(np.zeros(len(self.prior)))
                 moved[-1][column] = self._step(column, soak)
             states = [self._state(m, x, {}) for x in moved]
-            start_angle = np.full(len(states), plan.theta_0)
-            start_angle[1] += 1e-7  # the same physics, another switching pattern
-            signals = simulate_plan(
-                actuator, plan, [u for u, _ in states], np.array([f for _, f in states]), start_angle
-            )
+            band = np.ones(len(states))
+            band[1] += 1e-4  # the same physics, another switching pattern
+            signals = simulate_plan(actuator, plan, [u for u, _ in states], np.array([f for _, f in states]), band)
             statistics = view.statistics(signals)
-            view.prepare({n: 0.5 * float(np.mean((s[1] - s[0]) ** 2)) for n, s in statistics.items()})
+            view.prepare({n: SCATTER * float(np.mean((s[1] - s[0]) ** 2)) for n, s in statistics.items()})
             base = {n: s[:1] for n, s in statistics.items()}
             shifts = view.whiten({n: s[1:] - base[n] for n, s in statistics.items()})
             block = np.zeros((shifts.shape[1], len(self.prior)))
@@ -357,7 +359,7 @@ class Detector:
         out = []
         for m, (view, base) in enumerate(zip(self.views, self.base)):
             unit, fault = self._state(m, x, effects)
-            signals = simulate_plan(self.actuator, view.plan, [unit], fault[None], view.plan.theta_0)
+            signals = simulate_plan(self.actuator, view.plan, [unit], fault[None])
             out.append(view.whiten(_less(view.statistics(signals), base))[0])
         return np.concatenate(out)
 
@@ -404,37 +406,44 @@ class Detector:
             information[: len(x), : len(x)] += np.eye(len(x))
             gradient = design.T @ (self.delta - here)
             gradient[: len(x)] -= x
-            low, high = np.full(len(x), -FAR) - x, np.full(len(x), FAR) - x
+            low, high = np.maximum(-FAR - x, -STRIDE), np.minimum(FAR - x, STRIDE)
             if coordinates:
                 low, high = np.r_[low, coordinates.low - at], np.r_[high, coordinates.high - at]
             step = _bounded(information, gradient, low, high)
-            for damping in (1.0, 0.3, 0.1):
-                new_x = x + damping * step[: len(x)]
-                new_at = at + damping * step[len(x) :]
+            tries = [step, 0.5 * step, 0.2 * step]
+            if coordinates:  # the effect alone, for derivatives by nuisances carry scatter too
+                alone = np.zeros(len(step))
+                own = slice(len(x), None)
+                alone[own] = _bounded(information[own, own], gradient[own], low[own], high[own])
+                tries.insert(0, alone)
+            found = []
+            for move in tries:
+                new_x, new_at = x + move[: len(x)], at + move[len(x) :]
                 there = predicted(new_x, new_at)
-                new_cost = float(np.sum((self.delta - there) ** 2) + new_x @ new_x)
-                if new_cost < cost:
+                found.append((float(np.sum((self.delta - there) ** 2) + new_x @ new_x), new_x, new_at, there))
+                if len(found) > 1 + bool(coordinates) and min(f[0] for f in found) < cost:
                     break
+            new_cost, new_x, new_at, there = min(found, key=lambda f: f[0])
             if not new_cost < cost:
                 break
             gain, (x, at, here, cost) = cost - new_cost, (new_x, new_at, there, new_cost)
             if gain < 0.5:
                 break
-        return max(0.0, min(cost, self._tolerance_cost(effect)) - self.repeat) + lattice
+        return max(0.0, min(cost - self.repeat, self._tolerance_cost(effect))) + lattice
 
     def _tolerance_cost(self, effect: str | None) -> float:
         """Squared distance at which the unit's tolerances alone explain a truth of calibration effects."""
         others = [e for e in self.case.effects if e != effect]
-        if not all(EFFECTS[e].kind == "calibration" for e in others):
+        if not others or any(EFFECTS[e].kind != "calibration" for e in others):
             return np.inf
         cost = 0.0
         for e, name, sd in self.tolerances:
             if e in others:
                 cost += ((self.case.effects[e][name] - self.unit[e][name]) / sd) ** 2
-        return cost if others else 0.0
+        return cost
 
     def linear_distance(self, shift: np.ndarray, design: np.ndarray) -> float:
-        """Squared distance from a shift to the span of some columns, nuisances marginalised, everything to first order."""
+        """Squared distance from a shift to the span of some columns, nuisances marginalised, all to first order."""
         inner = self.jacobian.T @ design
         metric = design.T @ design - inner.T @ cho_solve(self.normal, inner)
         cross = design.T @ shift - inner.T @ cho_solve(self.normal, self.jacobian.T @ shift)
@@ -449,7 +458,9 @@ class Detector:
     def detectability(self) -> Detectability:
         """Distances that go into the key."""
         effects = [e for e in self.case.effects if e != "speed_quantisation"]
-        nominal = self.distance_to(None, 3)
+        nominal = min(self.squared(self.delta), self._tolerance_cost(None)) + self.lattice
+        if 5.0 < nominal < PLAIN:
+            nominal = self.distance_to(None, 3)
         members = {e: LATTICE for e in self.case.effects if e not in effects}
         design = {e: self.columns(e, COORDINATES[e].point(self.case.effects[e])) for e in effects}
         for effect in effects:
@@ -485,7 +496,7 @@ def _bounded(information: np.ndarray, gradient: np.ndarray, low: np.ndarray, hig
 
 
 class Coordinates:
-    """Smooth coordinates in which an effect is fitted: its parameters, or what replaces them where those are singular."""
+    """Smooth coordinates in which an effect is fitted: its parameters, or what replaces them where singular."""
 
     def __init__(self, effect: str):
         self.effect = effect
@@ -521,7 +532,7 @@ class Coordinates:
         if self.effect == "virtual_neutral":
             return np.array([1.0]) if at[0] < 0.5 else np.array([-1.0])
         reach = self.high - self.low
-        return np.where(at + 0.1 * reach <= self.high, 0.1, -0.1) * reach
+        return np.where(at + 0.3 * reach <= self.high, 0.3, -0.3) * reach
 
 
 COORDINATES = {effect: Coordinates(effect) for effect in EFFECTS}

@@ -1,0 +1,132 @@
+"""Blind cases are reproducible, balanced, within the catalogue's ranges, and tell nothing but what was recorded."""
+
+import ast
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import emafault.withheld
+from emafault.actuator.sensors import SensorNoise
+from emafault.config import reference_actuator
+from emafault.effects import EFFECTS
+from emafault.errors import InputError
+from emafault.recording import read_recording
+from emafault.withheld.benches import make_cases, rival_distances, simulate_truth
+from emafault.withheld.cases import STRATA, case_from_dict, draw_case
+from emafault.withheld.detectability import Detector
+
+NOISE = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
+IDS = list(EFFECTS)
+
+
+def seed_of(effect: str, stratum: int) -> int:
+    """Seed of T1 whose case holds an effect in an amplitude stratum."""
+    return len(IDS) * stratum + IDS.index(effect)
+
+
+def test_imports_nothing_of_the_diagnosis():
+    for path in Path(emafault.withheld.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or "", *(a.name for a in node.names)] if isinstance(node, ast.ImportFrom) else []
+            assert not {"gap", "twins"} & {part for name in names for part in name.split(".")}, path.name
+
+
+@pytest.mark.parametrize("rung", ["T0", "T1", "T2", "T3", "T4"])
+def test_a_case_is_its_seed(rung):
+    case = draw_case(rung, 137)
+    assert case == draw_case(rung, 137)
+    assert case != draw_case(rung, 138)
+    assert case_from_dict(json.loads(json.dumps(case.to_dict()))) == case
+
+
+def test_seeds_go_through_effects_and_amplitudes():
+    cases = [draw_case("T1", seed) for seed in range(len(IDS) * STRATA["T1"])]
+    assert [next(iter(c.effects)) for c in cases] == IDS * STRATA["T1"]
+    load = [abs(c.effects["load_constant"]["T"]) for c in cases if "load_constant" in c.effects]
+    assert load == sorted(load)
+    assert load[0] < 0.02 and load[-1] > 6.0
+
+
+def test_values_lie_in_the_catalogue():
+    for rung in ("T1", "T2", "T3", "T4"):
+        for seed in range(3 * len(IDS)):
+            case = draw_case(rung, seed)
+            for effect, values in case.effects.items():
+                for name, p in EFFECTS[effect].parameters.items():
+                    low, high = min(p.low, p.nominal), max(p.high, p.nominal)
+                    assert low - 1e-12 <= values[name] <= high + 1e-12, (effect, name)
+                if EFFECTS[effect].kind == "calibration":
+                    parameters = EFFECTS[effect].parameters
+                    assert any(
+                        abs(values[n] - p.nominal) > 4.0 * p.tolerance * p.nominal for n, p in parameters.items()
+                    )
+
+
+def test_health_means_what_the_format_says():
+    for seed in range(40):
+        for rung in ("T0", "T2"):
+            case = draw_case(rung, seed)
+            unknown = {r.fault[:5] for r in case.recordings if r.health == "unknown"}
+            assert len(unknown) <= 1
+            for recording in case.recordings:
+                if recording.health == "healthy":
+                    assert np.max(np.abs(recording.fault[:5])) <= 1e-3
+                assert recording.duration >= 0.35 and -50.0 <= recording.fault[5] <= 70.0
+            if case.strong_faults:
+                assert any(r.health != "healthy" for r in case.recordings)
+
+
+def test_unknown_rung():
+    with pytest.raises(InputError, match="rung"):
+        draw_case("T9", 0)
+
+
+def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
+    actuator = reference_actuator()
+    (name,) = make_cases("T4", [IDS.index("stribeck") + 4 * len(IDS)], tmp_path / "one", actuator, NOISE)
+    bench = tmp_path / "one" / "benches" / name
+    assert {p.suffix for p in bench.iterdir()} == {".nc"}
+    key = json.loads((tmp_path / "one" / "keys" / f"{name}.json").read_text())
+    assert key["case"]["forms"] == ["stribeck"]
+    assert key["detectability"]["nominal"] > 25.0
+    recordings = [read_recording(p) for p in sorted(bench.iterdir())]
+    assert [r.health for r in recordings] == [plan["health"] for plan in key["case"]["recordings"]]
+    for recording in recordings:
+        assert recording.fault is None
+        assert "stribeck" not in str(recording.attributes)
+    make_cases("T4", [IDS.index("stribeck") + 4 * len(IDS)], tmp_path / "two", actuator, NOISE)
+    again = read_recording(tmp_path / "two" / "benches" / name / "recording_0.nc")
+    np.testing.assert_array_equal(again.phase_voltage, recordings[0].phase_voltage)
+
+
+def detector(effect: str, stratum: int) -> Detector:
+    case = draw_case("T1", seed_of(effect, stratum))
+    return Detector(case, reference_actuator(), NOISE, simulate_truth(case, reference_actuator()))
+
+
+def test_distance_grows_with_the_amplitude():
+    far, near = detector("friction_asymmetry", 19).detectability(), detector("friction_asymmetry", 0).detectability()
+    assert near.nominal < 25.0 < 1e3 < far.nominal
+    assert far.members == {"friction_asymmetry": far.nominal}
+
+
+def test_an_effect_is_nearest_to_itself():
+    found = detector("contact_resistance", 19)
+    own, other, nominal = (found.distance_to(e) for e in ("contact_resistance", "load_spring", None))
+    assert own < 6.0 < other <= nominal + 1e-6
+
+
+def test_a_calibration_effect_costs_no_more_than_its_own_tolerance():
+    found = detector("bus_voltage", 3)
+    value, drawn = found.case.effects["bus_voltage"]["Vdc"], found.case.tolerances["bus_voltage"]["Vdc"]
+    assert found.distance_to(None) <= ((value - drawn) / 0.24) ** 2 + 1e-9
+
+
+def test_rivals_from_the_key_alone(tmp_path):
+    (name,) = make_cases("T1", [seed_of("load_constant", 10)], tmp_path, reference_actuator(), NOISE)
+    key = json.loads((tmp_path / "keys" / f"{name}.json").read_text())
+    assert rival_distances(key, ["load_constant"])["load_constant"] < 6.0
+    assert rival_distances(key, []) == {}
