@@ -14,6 +14,8 @@ include: "workflow/rules/dataset.smk"
 include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/identification.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/measured.smk"
+include: "workflow/rules/withheld.smk"
 
 
 # The default target: everything that one experiment, or one study with its variants, results in.

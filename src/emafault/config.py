@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CONF = ROOT / "conf"
 PACKAGE = Path(__file__).resolve().parent
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
-GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment"))
+GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
 #: what a dataset is for -> its place in the sequence of seeds
 PARTS = {"training": 0, "fresh": 1, "reference": 2}
 
@@ -404,6 +404,31 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
 def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     """What diagnosing a bench reads."""
     return recursively_sorted(_pick(config, "actuator", "sensors", "tracking"))
+
+
+def withheld_draws() -> list[str]:
+    """Names of the draws of blind cases in conf/withheld."""
+    return sorted(path.stem for path in (CONF / "withheld").glob("*.yaml"))
+
+
+def _withheld_draw(draw: str) -> dict[str, Any]:
+    return OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore[return-value]
+
+
+def withheld_jobs(draw: str) -> list[tuple[str, int]]:
+    """(rung, batch) of every job of a draw."""
+    read = _withheld_draw(draw)
+    return [(rung, n) for rung, cases in read["cases"].items() for n in range(-(-cases // read["batch"]))]
+
+
+def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
+    """What one job of blind cases reads: its seeds, the actuator and the sensors."""
+    read = _withheld_draw(draw)
+    first, size = read["first_seed"] + batch * read["batch"], read["batch"]
+    last = min(first + size, read["first_seed"] + read["cases"][rung])
+    config = compose()
+    seeds = {"rung": rung, "first": first, "last": last}
+    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
 
 
 @dataclass(frozen=True)

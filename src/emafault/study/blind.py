@@ -1,12 +1,13 @@
 """Diagnoses of blind cases, for the withheld check and for calibrating the probabilities.
 
-The cases' generator and the diagnoser do not know each other; they meet here. A diagnosis sees a bench's folder and, on the rung
-that leaves an effect out, which one the library lacks.
+The cases' generator and the diagnoser do not know each other; they meet here. A diagnosis sees a bench's folder and, on
+the rung that leaves an effect out, which one the library lacks.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -64,6 +65,26 @@ def run_cases(
     return names
 
 
+def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
+    """Run one job of a draw and write where its cases stand.
+
+    Cases are kept per version of the code: a killed job goes on where it was, one whose code changed starts anew.
+    """
+    seeds = spec["seeds"]
+    folder = output.parent / f"cases_{code[:8]}"
+    actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
+    span = range(seeds["first"], seeds["last"])
+    names = run_cases(seeds["rung"], span, folder, actuator, noise, Calibration.load())
+    text = json.dumps({"folder": folder.name, "cases": names})
+    replace_atomically(output, lambda temporary: temporary.write_text(text))
+
+
+def calibrate_draw(batches: Sequence[Path], output: Path) -> None:
+    """Calibrate on the cases of a draw and write the calibration."""
+    folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
+    calibrate(folder, Calibration.load()).save(output)
+
+
 def diagnose_bench(
     bench: Path,
     actuator: ActuatorParameters,
@@ -82,8 +103,8 @@ def diagnose_bench(
 def calibrate(folder: Path, start: Calibration) -> Calibration:
     """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
 
-    Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case held a
-    detectable gap, the second on whether the best set was right among cases that did.
+    Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case
+    held a detectable gap, the second on whether the best set was right among cases that did.
     """
     gap_rows, gap_truth, right_rows, right_truth = [], [], [], []
     for path in sorted((folder / "keys").glob("*.json")):

@@ -1,0 +1,35 @@
+"""The scoreboard of a draw of blind cases, written and tracked."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..tracking import Entry, log_run
+from ..withheld.scoreboard import write_scoreboard
+from ..withheld.scoring import score
+
+
+def score_draw(batches: Sequence[Path], report: Path, scores: Path, where: str) -> None:
+    """Score the cases of a draw: page, figures and ``scores.json`` beside ``report``, and one MLflow run.
+
+    Parameters
+    ----------
+    batches : what the jobs of the draw have written
+    where : what ``prepare_tracking`` has written
+
+    Raises
+    ------
+    InputError : a verdict that cannot be read, or a tracking server that cannot be used
+    """
+    folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
+    found = score(folder)
+    page = write_scoreboard(found, report.parent)
+    if page != report:
+        page.replace(report)
+    place = json.loads(Path(where).read_text())
+    metrics = {m["id"]: float(m["value"]) for m in found["metrics"] if m["value"] is not None}
+    draw = report.parent.name
+    entry = Entry(
+        f"withheld {draw}", {"draw": draw, "cases": len(found["rows"])}, metrics, files={report: "", scores: ""}
+    )
+    log_run(place["uri"], place["experiment"], entry)
