@@ -31,7 +31,7 @@ def draw_map(
     height = 0.27 * len(rows) * len(panels) + 1.0 + 0.75 * len(panels)
     fig, axes = plt.subplots(len(panels), 1, figsize=(10.5, height), squeeze=False, sharex=True)
     norm = LogNorm(1.0, max(100.0, float(np.nanmax(before, initial=1.0))))
-    image = None
+    image: Any = None
     for ax, (title, values) in zip(axes[:, 0], panels):
         shown = np.ma.masked_invalid(np.maximum(values, 1.0))
         image = ax.imshow(shown, aspect="auto", cmap=_MAP, norm=norm, interpolation="nearest")
@@ -74,7 +74,7 @@ def draw_recordings(
         squeeze=False, sharey=True,
     )  # fmt: skip
     norm = LogNorm(0.8, max(20.0, float(np.nanmax(before, initial=1.0))))
-    image = None
+    image: Any = None
     for ax, (title, values) in zip(axes[0], panels):
         shown = np.ma.masked_invalid(np.maximum(values, 0.8))
         image = ax.imshow(shown, aspect="auto", cmap=_MAP, norm=norm, interpolation="nearest")
@@ -270,4 +270,24 @@ def draw_statistics(
     ax.set_ylabel("measured less predicted,\nin standard deviations")
     ax.set_title(label, loc="left")
     ax.legend(fontsize=8.5)
+    return fig
+
+
+def draw_visibility(sizes: Mapping[str, float]) -> plt.Figure:
+    """Smallest size of each effect that would have shown, over its usual size, on a logarithmic axis."""
+    names = sorted(sizes, key=lambda e: sizes[e])
+    fig, ax = plt.subplots(figsize=(8.4, 0.2 * len(names) + 0.9))
+    values = np.clip([sizes[n] for n in names], 1e-4, 1e3)
+    colours = [BEFORE if v > 1.0 else "#e8a15b" if v > 0.3 else AFTER for v in values]
+    y = np.arange(len(names))
+    ax.hlines(y, 1e-4, values, color="#dcdcd8", lw=1.2)
+    ax.scatter(values, y, c=colours, s=26, zorder=3)
+    ax.axvline(1.0, color="#777", lw=1.0)
+    ax.set_xscale("log")
+    ax.set_xlim(0.5 * float(values.min()), max(2.0, 2.0 * float(values.max())))
+    ax.set_yticks(y, [n.replace("_", " ") for n in names], fontsize=8.5)
+    ax.set_ylim(-0.7, len(names) - 0.3)
+    ax.set_xlabel("smallest size that would have shown (five standard deviations), over a usual size of the effect")
+    ax.tick_params(axis="y", length=0)
+    ax.grid(axis="y", visible=False)
     return fig

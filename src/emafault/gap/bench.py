@@ -364,8 +364,8 @@ def split_bench(recordings: Mapping[str, Recording]) -> tuple[list[str], list[st
             cost = _cost(recordings, explore, confirm) + 2.0 * (number - len(confirm))
             if best is None or (cost, confirm) < best:
                 best = (cost, confirm)
-    confirm = list(best[1]) if best else []
-    return [n for n in names if n not in confirm], confirm
+    held = list(best[1]) if best else []
+    return [n for n in names if n not in held], held
 
 
 def _conditions(recordings: Mapping[str, Recording]) -> list[list[str]]:

@@ -1,7 +1,7 @@
 """What to record next: of a menu of recordings, those that tell rival readings of a bench apart, or show what it hides.
 
-Each recording is imagined under the first reading. A rival's prediction differs from it by d; with C the statistics'
-noise, J the derivatives by everything the rival may still adjust and S what is known of that from the bench, the squared
+Each recording is imagined under the first reading. A rival's prediction differs from it by d. With C the noise of the
+statistics, J the derivatives by all that the rival may still adjust and S what the bench says of that, the squared
 distance is d' (C + J S J')^-1 d, and exp(distance/2) the odds that the recording is expected to bring.
 """
 
@@ -24,29 +24,13 @@ SHOWN = 25.0  # squared distance from which an effect is shown
 LIKELY = 0.02  # probability below which a reading is no rival
 
 
-class Experiment(Protocol):
-    """One entry of the menu."""
-
-    @property
-    def text(self) -> str:
-        """The command in words."""
-
-    @property
-    def ambient_temperature(self) -> float:
-        """Soak temperature (degC)."""
-
-    @property
-    def duration(self) -> float:
-        """Length (s)."""
-
-
 class Laboratory(Protocol):
     """A machine's menu, and twins of recordings that have not been made."""
 
-    def menu(self) -> Sequence[Experiment]:
-        """What could be recorded."""
+    def menu(self) -> Sequence[Any]:
+        """What could be recorded: entries with ``text``, ``ambient_temperature`` (degC), ``duration`` (s)."""
 
-    def imagine(self, twin: Any, values: np.ndarray, effects: Sequence[str], experiments: Sequence[Experiment]) -> Twin:
+    def imagine(self, twin: Any, values: np.ndarray, effects: Sequence[str], experiments: Any) -> Any:
         """A twin of these recordings, named 0, 1, ..., under a fitted set of effects."""
 
 
@@ -214,20 +198,17 @@ def _known(diagnosis: Diagnosis, problem: Problem, point: Point, parameters: Seq
 
 def _propose(
     diagnosis: Diagnosis,
-    menu: Sequence[Experiment],
+    menu: Sequence[Any],
     first: _Reading,
     rivals: Sequence[_Reading],
     found: Sequence[tuple[str, list[float], dict | None]],
 ) -> list[dict]:
     """The best experiments, each for what the ones before it leave open."""
     left = set(range(len(rivals)))
-    pending, out = list(found), []
+    pending = list(found)
+    out: list[dict] = []
     while pending and len(out) < PROPOSED:
-        open_ = frozenset(left)
-
-        name, distances, tightens = max(
-            pending, key=lambda item, open_=open_: _worth(item[1], open_) - 1e-6 * int(item[0])
-        )
+        name, distances, tightens = max(pending, key=lambda item: (_worth(item[1], left), -int(item[0])))
         pending = [item for item in pending if item[0] != name]
         candidates = sorted(left) or list(range(len(rivals)))
         target = max(candidates, key=lambda r: distances[r])
@@ -244,12 +225,12 @@ def _propose(
                 "tightens": tightens,
             }
         )
-        left -= set(shown)
+        left.difference_update(shown)
     return out
 
 
-def _worth(distances: Sequence[float], left: frozenset[int]) -> float:
-    """What an experiment shows, each reading up to where it is plainly shown; one that is shown already counts little."""
+def _worth(distances: Sequence[float], left: set[int]) -> float:
+    """What an experiment shows, each reading up to where it is plain; one that is shown already counts little."""
     return sum((1.0 if r in left else 0.01) * min(d, 2 * SHOWN) for r, d in enumerate(distances))
 
 

@@ -17,7 +17,7 @@ from .words import cannot_tell, consequence, effect_words, finding, number
 
 NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
-HARDLY = 0.8  # of the prior's width: smallest visible size from which an effect would hardly have shown
+HARDLY = 1.0  # of the prior's width: smallest visible size from which an effect would hardly have shown
 RETRAINED = ("<!-- retrained -->", "<!-- /retrained -->")
 
 
@@ -27,6 +27,7 @@ def write_report(
     truths: Mapping[str, np.ndarray] | None = None,
     region: Any = None,
     retrained: str = "",
+    labels: Mapping[str, str] | None = None,
 ) -> None:
     """Draw and write the page.
 
@@ -35,6 +36,7 @@ def write_report(
     truths : recording -> true fault vector, where known
     region : what ``figures.gap.draw_region`` shows; None draws the statistics of the worst equation instead
     retrained : section on the retrained network, once made
+    labels : recording -> how figures call it
 
     Raises
     ------
@@ -44,12 +46,14 @@ def write_report(
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     page.paragraph(" ".join(t for t in (finding(verdict), consequence(verdict)) if t), "lead")
     page.heading("What these recordings cannot tell")
-    limits = cannot_tell(verdict, hidden(diagnosis))
+    sizes = visible_from(diagnosis)
+    named = {e for entry in verdict["which"][:1] for e in entry["effects"]}
+    limits = cannot_tell(verdict, {e: s for e, s in sizes.items() if s > HARDLY and e not in named})
     limits = limits or ["Nothing stands out: every effect of the library would have shown at a common size."]
     page.parts.append(
         "<ul>" + "".join(f"<li>{html.escape(text[0].upper() + text[1:])}</li>" for text in limits) + "</ul>"
     )
-    _where(page, diagnosis)
+    _where(page, diagnosis, labels or {})
     _which(page, diagnosis)
     if region is not None:
         page.heading("Measured against simulated, where they differ most")
@@ -58,25 +62,26 @@ def write_report(
         _statistics(page, diagnosis)
     _how_far(page, diagnosis)
     if verdict["fault_vector"]:
-        _faults(page, verdict, truths or {})
+        _faults(page, verdict, truths or {}, labels or {})
     page.parts.append(f"{RETRAINED[0]}{retrained}{RETRAINED[1]}")
     _next(page, verdict)
+    if sizes:
+        page.heading("What would have shown")
+        page.figure(
+            "visible", figures.draw_visibility(sizes), "Left of the line, an effect of usual size would have shown."
+        )
     _record(page, diagnosis)
     page.write(path)
 
 
-def hidden(diagnosis: Diagnosis) -> dict[str, float]:
-    """Effects that would hardly have shown -> smallest visible size over the prior's width."""
+def visible_from(diagnosis: Diagnosis) -> dict[str, float]:
+    """Structural effect -> smallest size that would have shown, over its prior's width."""
     problem = diagnosis.explore
     by_id = {h.effect: h for h in diagnosis.twin.hypotheses}
-    named = {e for entry in diagnosis.verdict["which"][:1] for e in entry["effects"]}
     out = {}
     for effect, entry in diagnosis.verdict["detectable_from"].items():
-        if effect in named or effect not in by_id or by_id[effect].kind == "calibration":
-            continue
-        share = entry["size"] / problem.parameters[problem.effect_parameters(by_id[effect])[0]].sd
-        if share > HARDLY:
-            out[effect] = float(share)
+        if effect in by_id and by_id[effect].kind != "calibration":
+            out[effect] = float(entry["size"] / problem.parameters[problem.effect_parameters(by_id[effect])[0]].sd)
     return out
 
 
@@ -90,12 +95,12 @@ def _z(problem: Problem, prediction: np.ndarray) -> np.ndarray:
     return (problem.observed - prediction) / problem.deviations()
 
 
-def _where(page: Page, diagnosis: Diagnosis) -> None:
+def _where(page: Page, diagnosis: Diagnosis, labels: Mapping[str, str]) -> None:
     problem, after = diagnosis.explore, _after(diagnosis)
     rows = list(dict.fromkeys(c.equation for c in problem.cells))
     columns, place = regions(problem)
     before_z = _z(problem, diagnosis.found.null.prediction)
-    maps = [_excess(problem, rows, place, len(columns), before_z)]
+    maps: list[Any] = [_excess(problem, rows, place, len(columns), before_z)]
     maps.append(_excess(problem, rows, place, len(columns), _z(problem, after)) if after is not None else None)
     page.heading("Where")
     worst = diagnosis.verdict["where"][:1]
@@ -112,7 +117,7 @@ def _where(page: Page, diagnosis: Diagnosis) -> None:
     names = [*problem.part]
     ladder = diagnosis.ladder
     held = list(ladder.problem.part) if ladder is not None else []
-    tables = [_by_recording(problem, rows, names, before_z)]
+    tables: list[Any] = [_by_recording(problem, rows, names, before_z)]
     tables.append(_by_recording(problem, rows, names, _z(problem, after)) if after is not None else None)
     if ladder is not None:
         for m, rung in enumerate((ladder.recalibrated, ladder.after)):
@@ -120,11 +125,11 @@ def _where(page: Page, diagnosis: Diagnosis) -> None:
                 prediction = ladder.problem.predict(rung.values)[0]
                 extra = _by_recording(ladder.problem, rows, held, _z(ladder.problem, prediction))
                 tables[m] = np.concatenate([tables[m], extra], axis=1)
-    labels = [n.removesuffix(".nc").replace("recording_", "") for n in (*names, *held)]
-    if len(labels) > 1:
+    shown = [labels.get(n, n) for n in (*names, *held)]
+    if len(shown) > 1:
         page.figure(
             "recordings",
-            figures.draw_recordings(rows, labels, len(held), tables[0], tables[1]),
+            figures.draw_recordings(rows, shown, len(held), tables[0], tables[1]),
             "Equation by recording; those to the right of the line took no part in fitting or choosing.",
         )
 
@@ -253,7 +258,9 @@ def _how_far(page: Page, diagnosis: Diagnosis) -> None:
     )
 
 
-def _faults(page: Page, verdict: Mapping[str, Any], truths: Mapping[str, np.ndarray]) -> None:
+def _faults(
+    page: Page, verdict: Mapping[str, Any], truths: Mapping[str, np.ndarray], labels: Mapping[str, str]
+) -> None:
     page.heading("Fault vector before and after")
     groups: dict[tuple, dict[str, Any]] = {}
     for name, entry in verdict["fault_vector"].items():
@@ -266,7 +273,7 @@ def _faults(page: Page, verdict: Mapping[str, Any], truths: Mapping[str, np.ndar
         groups.values(), key=lambda g: -max(abs(g["after"][c]["value"]) for c in FAULT_NAMES[:5] if c in g["after"])
     )
     for group in ordered:
-        first, more = group["names"][0].removesuffix(".nc"), len(group["names"]) - 1
+        first, more = labels.get(group["names"][0], group["names"][0]), len(group["names"]) - 1
         group["label"] = first + (f"\nand {more} more" if more else "")
     page.figure(
         "faults",

@@ -147,13 +147,13 @@ def diagnose_recordings(
     recordings = bench.recordings
     explore, confirm = split_bench(recordings)
     truths = {n: r.fault for n, r in recordings.items() if r.fault is not None}
-    twin = ActuatorTwin(actuator, recordings, noise, tuple(exclude), THREADS)
+    twin: Any = ActuatorTwin(actuator, recordings, noise, tuple(exclude), THREADS)
     found = diagnose(twin, bench.name, explore, confirm, calibration or Calibration.load(), truths)
     verdict = found.verdict
     verdict["warnings"] = bench.warnings
-    verdict.setdefault("held_out", held_out(found))
     if not whole:
         return Diagnosed(found, truths)
+    verdict["held_out"] = held_out(found)
     verdict["shrinks"]["features"] = feature_ladder(found)
     verdict["next_experiment"] = next_experiments(found, actuator_experiments)
     named = verdict["verdict"] in ("explained", "group", "partly")
@@ -259,7 +259,7 @@ def _track(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]
         },
         metrics=metrics,
         tags={"stage": "diagnosis", "bench": verdict["bench"]},
-        files={path: "" for path in (folder / VERDICT, folder / REPORT) if path.exists()},
+        files={str(folder / name): "" for name in (VERDICT, REPORT)},
     )
     try:
         uri = tracking["uri"]

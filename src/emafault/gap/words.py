@@ -43,6 +43,15 @@ def finding(verdict: Mapping[str, Any]) -> str:
             f"The simulator and these recordings differ, and nothing in the library explains it (probability "
             f"{_percent(first['probability'])} that the cause is not in the library)."
         )
+        if verdict.get("before_confirm") in ("explained", "group", "partly"):
+            best = next((e for e in verdict["which"] if e.get("parameters")), None)
+            signal = verdict["shrinks"]["signal"]
+            if best is not None and signal is not None:
+                text += (
+                    f" The explored recordings alone spoke for {effect_words(best['effects'])}, but those that took no "
+                    f"part contradict it: their misfit goes from {number(signal['recalibrated'])} to "
+                    f"{number(signal['after'])} times the noise."
+                )
         return text + (f" The difference is largest in {_place(where[0])}." if where else "")
     names = effect_words(first["effects"])
     if kind == "group":

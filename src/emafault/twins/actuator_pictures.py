@@ -63,15 +63,16 @@ def worst_region(diagnosis: Diagnosis) -> Region | None:
     runs = {rung: twin._runs(values[None, :], name)[0] for rung, values in points.items()}
     computed = {rung: twin._statistics_of(name, run, keep=True) for rung, run in runs.items()}
     row = EQUATIONS.index(worst.equation)
-    index = next(m for m, c in enumerate(cells_of(name)) if (c.equation, c.label) == (worst.equation, worst.label))
+    alike = [m for m, c in enumerate(cells_of(name)) if (c.equation, c.along) == (worst.equation, worst.along)]
+    counts = np.any(brought.computed.regressors[alike] != 0.0, axis=0)
     theta = brought.signals["rotor_angle"]
     x, label = _coordinate(twin, worst.equation, worst.along, worst.label, brought.signals, brought.nominal.interval)
     low, high = _span(x, worst.along)
     edges = np.linspace(low, high, BINS + 1)
     whole = worst.along in ("rotor_angle", "order")  # along an angle all samples are shown, else those that count
 
-    def binned(residual: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        where = np.ones(len(theta), bool) if whole else counts != 0.0
+    def binned(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        where = np.ones(len(theta), bool) if whole else counts.copy()
         where[:2] = False
         place = np.clip(np.digitize(x[where], edges) - 1, 0, BINS - 1)
         number = np.bincount(place, minlength=BINS).astype(float)
@@ -81,13 +82,13 @@ def worst_region(diagnosis: Diagnosis) -> Region | None:
         mean[number < 5] = np.nan
         return mean, error
 
-    mean, error = binned(brought.computed.residual[row], brought.computed.regressors[index])
+    mean, error = binned(brought.computed.residual[row])
     curves = {"measured": mean}
     for rung, c in computed.items():
-        curves[rung] = binned(c.residual[row], brought.computed.regressors[index])[0]
+        curves[rung] = binned(c.residual[row])[0]
     units, text = _RESIDUAL["electrical" if worst.equation in PHASE_EQUATIONS else worst.equation]
     gap = brought.computed.residual[row] - computed["recalibrated"].residual[row]
-    stretch = _stretch(gap * (brought.computed.regressors[index] != 0.0), brought.nominal.interval, theta)
+    stretch = _stretch(gap * counts, brought.nominal.interval, theta)
     simulated = {rung: twin._simulate(name, run) for rung, run in runs.items()}
     traces = {
         label_: {
