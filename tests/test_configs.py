@@ -46,6 +46,8 @@ def test_every_option_of_a_group_composes(group, tmp_path):
         ("recording.duration=1.00005", ("recording.duration", "1.00005", "whole number")),
         ("faults.dT.high=choice(1,2)", ("faults.dT.high", "sweep", "one value")),
         ("experiment=smoke", ("experiment", "chosen by itself")),
+        ("search.space.network.width.low=0", ("search.space.network.width", "0", "from 1 to 256")),
+        ("+search.space.network.depth=[1]", ("search.space.network.depth", "activation, coordinates, layers, width")),
         ("reconstruction.paper.threshold=-1", ("reconstruction.paper.threshold", "-1", "from 0")),
         ("'", ("overrides", "quotation")),
     ],

@@ -71,8 +71,10 @@ def test_one_run_is_read_alone_as_a_recording(tmp_path):
 
 def test_units_of_a_reference_are_those_of_the_fresh_part():
     spec = config.compose("unit_tolerance", ["unit.reference_recordings=2", "sampling.fresh=20"])
-    fresh, _ = dataset.sample_runs(config.dataset_spec(spec, "fresh"))
-    reference, faults = dataset.sample_runs(config.dataset_spec(spec, "reference"))
+    fresh = dataset.sample_runs(config.dataset_spec(spec, "fresh")).records(slice(None))
+    sample = dataset.sample_runs(config.dataset_spec(spec, "reference"))
+    reference, faults = sample.records(slice(None)), sample.faults
+    assert np.array_equal(sample.records(slice(7, 9)), reference[7:9])
     assert np.all(faults[:, :5] == 0.0) and len(np.unique(faults[:, 5])) == 40
     assert np.array_equal(reference["unit_calibration_R_scale"], np.repeat(fresh["unit_calibration_R_scale"], 2))
     assert 0.003 < np.std(fresh["unit_calibration_R_scale"]) < 0.03
@@ -80,7 +82,7 @@ def test_units_of_a_reference_are_those_of_the_fresh_part():
 
 def test_magnets_lag_by_the_configured_range():
     spec = config.dataset_spec(config.compose("magnet_lagging"), "training")
-    runs, _ = dataset.sample_runs(spec)
+    runs = dataset.sample_runs(spec).records(slice(None))
     lag = runs["dT"] - runs["dT_magnet"]
     assert 0.0 <= lag.min() < 2.0 and 38.0 < lag.max() <= 40.0
     assert np.all(runs["magnet_temperature_alpha_m"] == -4e-4)

@@ -12,7 +12,7 @@ import shlex
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import IO, Any
 
@@ -260,6 +260,7 @@ def _check(config: dict[str, Any]) -> None:
         schema.refuse("recording.discard", recording["discard"], "at least 0.15 s less than recording.duration")
     if config["sampling"]["shards"] > min(config["sampling"]["runs"], config["sampling"]["fresh"]):
         schema.refuse("sampling.shards", config["sampling"]["shards"], "no more than sampling.runs and sampling.fresh")
+    _check_space(config["search"]["space"])
     if config["search"]["reconstruction"] not in config["reconstruction"] and config["search"]["trials"]:
         schema.refuse(
             "search.reconstruction", config["search"]["reconstruction"], ", ".join(sorted(config["reconstruction"]))
@@ -267,6 +268,27 @@ def _check(config: dict[str, Any]) -> None:
 
 
 _NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")
+
+
+def _check_space(space: Mapping[str, Mapping[str, Any]]) -> None:
+    """Check that every end and every value of the space that is searched is one that the setting accepts."""
+    groups = {"network": schema.Network, "training": schema.Training}
+    for section, keys in space.items():
+        if section not in groups:
+            raise InputError(schema.unknown_key(section, "search.space", list(groups)))
+        known = {field.name: field for field in fields(groups[section])}
+        for name, values in keys.items():
+            key = f"search.space.{section}.{name}"
+            if name not in known:
+                raise InputError(schema.unknown_key(name, f"search.space.{section}", list(known)))
+            if isinstance(values, Mapping):
+                if not {"low", "high"} <= set(values) <= {"low", "high", "log", "step"}:
+                    schema.refuse(key, values, "a list of values, or low, high and at will log and step")
+                if values["low"] > values["high"]:
+                    schema.refuse(f"{key}.high", values["high"], f"a number not below {key}.low = {values['low']}")
+                values = [values["low"], values["high"]]
+            for value in values if isinstance(values, list) else [values]:
+                schema.check(value, known[name].type, key, known[name].metadata)
 
 
 def _check_named(key: str, value: Mapping[str, Any], label: str, schemas: Mapping[str, type]) -> None:

@@ -38,24 +38,44 @@ def shard_bounds(runs: int, shards: int, shard: int) -> tuple[int, int]:
     return runs * shard // shards, runs * (shard + 1) // shards
 
 
-def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the run records of one part of a dataset.
+@dataclass(frozen=True)
+class Sample:
+    """What is drawn for every run of one part; records, which are large, are made for the rows asked for."""
+
+    spec: Mapping[str, Any]  # the sub-tree ``config.dataset_spec``
+    faults: np.ndarray  # (run, 6)
+    dT_magnet: np.ndarray  # (run,) K
+    theta_0: np.ndarray  # (run,) rad
+    spread: dict[str, np.ndarray]  # field of a run's record -> (unit,) factor of its tolerance
+
+    def records(self, rows: slice) -> np.ndarray:
+        """(row,) records of ``RUN_DTYPE``."""
+        runs = make_runs(
+            ActuatorParameters(**self.spec["actuator"]),
+            self.faults[rows],
+            effects=self.spec["effects"],
+            eccentricity_law=self.spec["faults"]["law"],
+            dT_magnet=self.dT_magnet[rows],
+            theta_0=self.theta_0[rows],
+        )
+        unit = np.arange(len(self.faults))[rows] // self.spec["recordings_of_a_unit"]
+        for field, factor in self.spread.items():
+            runs[field] *= factor[unit]
+        return runs
+
+
+def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> Sample:
+    """Draw the runs of one part of a dataset.
 
     Parameters
     ----------
     spec : the sub-tree ``config.dataset_spec``
     faults : (run, 6) given fault vectors; None samples them
-
-    Returns
-    -------
-    (run,) records of ``RUN_DTYPE`` and (run, 6) fault vectors
     """
-    actuator = ActuatorParameters(**spec["actuator"])
-    ranges = spec["faults"]
-    units, repeats, seed = spec["runs"], spec["recordings_of_a_unit"], spec["seed"]
+    ranges, repeats, seed = spec["faults"], spec["recordings_of_a_unit"], spec["seed"]
     if faults is None:
         faults = sample_faults(
-            units * repeats,
+            spec["runs"] * repeats,
             shorted_turns=(ranges["N"]["low"], ranges["N"]["high"]),
             eccentricity=(ranges["xi"]["low"], ranges["xi"]["high"]),
             temperature=(ranges["dT"]["low"], ranges["dT"]["high"]),
@@ -66,22 +86,17 @@ def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> tu
             faults[:, :5] = 0.0
     number = len(faults)
     lag, angle = spec["magnet_lag"], spec["recording"]["theta_0"]
-    runs = make_runs(
-        actuator,
-        faults,
-        effects=spec["effects"],
-        eccentricity_law=ranges["law"],
-        dT_magnet=faults[:, 5] - np.random.default_rng([seed, 2]).uniform(lag["low"], lag["high"], number),
-        theta_0=np.random.default_rng([seed, 3]).uniform(angle["low"], angle["high"], number),
-    )
+    colder = np.random.default_rng([seed, 2]).uniform(lag["low"], lag["high"], number)
+    theta_0 = np.random.default_rng([seed, 3]).uniform(angle["low"], angle["high"], number)
+    spread = {}
     if spec["tolerance"]:
         rng = np.random.default_rng([spec["unit_seed"], 4])
         for effect in EFFECTS.values():
             for name, parameter in effect.parameters.items():
                 if parameter.tolerance:
-                    spread = 1.0 + spec["tolerance"] * parameter.tolerance * rng.standard_normal(number // repeats)
-                    runs[effect.field(name)] *= np.repeat(spread, repeats)
-    return runs, faults
+                    deviation = spec["tolerance"] * parameter.tolerance
+                    spread[effect.field(name)] = 1.0 + deviation * rng.standard_normal(number // repeats)
+    return Sample(spec, faults, faults[:, 5] - colder, theta_0, spread)
 
 
 def simulate_blocks(
@@ -97,12 +112,12 @@ def simulate_blocks(
     duration, interval = recording["duration"], recording["interval"]
     command = command_positions(settings.pop("name"), settings, duration, spec["actuator"]["control_period"])
     noise = SensorNoise(**spec["sensors"])
-    runs, faults = sample_runs(spec, faults)
+    sample = sample_runs(spec, faults)
     for start in range(first, last, BLOCK):
         rows = slice(start, min(start + BLOCK, last))
-        clean = simulate(runs[rows], command, duration, interval)
-        signals = measure(clean, runs[rows], noise, spec["seed"], first_run=start)
-        yield Block(start, interval, signals, faults[rows])
+        runs = sample.records(rows)
+        signals = measure(simulate(runs, command, duration, interval), runs, noise, spec["seed"], first_run=start)
+        yield Block(start, interval, signals, sample.faults[rows])
 
 
 def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:

@@ -150,8 +150,8 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     command = command_positions(
         settings.pop("name"), settings, recording["duration"], part["actuator"]["control_period"]
     )
-    runs, faults = sample_runs(part)
-    runs, faults = runs[: spec["runs"]], faults[: spec["runs"]]
+    sample = sample_runs(part)
+    runs, faults = sample.records(slice(spec["runs"])), sample.faults[: spec["runs"]]
     actuator = ActuatorParameters(**part["actuator"])
     found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": []}
     holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
