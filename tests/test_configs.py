@@ -2,7 +2,7 @@
 
 import pytest
 
-from emafault import config
+from emafault import config, provenance
 from emafault.errors import InputError
 
 
@@ -149,12 +149,12 @@ def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_pa
         (package / name).write_text(text)
     script = tmp_path / "script.py"
     script.write_text("def run():\n    from emafault import used\n")
-    monkeypatch.setattr(config, "PACKAGE", package)
+    monkeypatch.setattr(provenance, "PACKAGE", package)
 
     def digest():
-        config.source_digest.cache_clear()
-        config._read_source.cache_clear()
-        return config.source_digest(script)
+        provenance.source_digest.cache_clear()
+        provenance._read_source.cache_clear()
+        return provenance.source_digest(script)
 
     first = digest()
     (package / "unused.py").write_text("x = 2\n")

@@ -3,27 +3,23 @@
 Only this module, the command line and the Snakefile read configuration; everything else is handed one sub-tree.
 """
 
-import ast
-import fcntl
 import functools
 import hashlib
-import os
 import shlex
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from omegaconf import OmegaConf
 
-from . import schema
+from . import checks, schema
 from .errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 CONF = ROOT / "conf"
-PACKAGE = Path(__file__).resolve().parent
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
 #: what a dataset is for -> its place in the sequence of seeds
@@ -49,40 +45,6 @@ def recursively_sorted(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [recursively_sorted(item) for item in value]
     return value
-
-
-def check_writable(folder: str | Path) -> None:
-    """Refuse, before anything runs, results that cannot be written.
-
-    Raises
-    ------
-    InputError : the folder is a file, or is read-only
-    """
-    path = Path(folder)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is not a folder, results cannot be written there")
-    nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: is read-only, results cannot be written there")
-
-
-_claims: list[IO[str]] = []  # held as long as the process lives
-
-
-def claim(folder: str | Path) -> None:
-    """Claim a folder of results for this process; a killed process leaves no claim behind, unlike a lock file.
-
-    Raises
-    ------
-    InputError : another process is at work there
-    """
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    file = open(Path(folder) / ".lock", "w")
-    _claims.append(file)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise InputError(f"{folder}: another run is at work there, wait until it has ended") from None
 
 
 # --- composition ---------------------------------------------------------------------------------------------------
@@ -142,7 +104,7 @@ def _compose(experiment: str, overrides: tuple[str, ...]) -> dict[str, Any]:
                 shutil.rmtree(folder, ignore_errors=True)
     config["name"] = config["name"] or name
     config["dataset"] = config["dataset"] or name
-    _check(config)
+    checks.check_configuration(config)
     return recursively_sorted(config) | {"variants": config["variants"]}  # variants keep their order
 
 
@@ -206,108 +168,6 @@ def _one_line(error: Exception, name: str, search: list[str], overrides: tuple[s
                 return schema.unknown_key(".".join(words[depth:]), ".".join(words[:depth]), [str(k) for k in node])
             node = OmegaConf.select(base, ".".join(words[: depth + 1]))
     return " ".join(str(error).split())
-
-
-# --- checks --------------------------------------------------------------------------------------------------------
-
-_SCHEMAS = {
-    "actuator": schema.Actuator,
-    "faults": schema.Faults,
-    "magnet": schema.Magnet,
-    "load": schema.Load,
-    "recording": schema.RecordingConditions,
-    "sensors": schema.Sensors,
-    "unit": schema.Unit,
-    "sampling": schema.Sampling,
-    "network": schema.Network,
-    "training": schema.Training,
-    "search": schema.Search,
-    "evaluation": schema.Evaluation,
-    "tracking": schema.Tracking,
-    "effects": dict[str, dict[str, float]],
-    "variants": dict[str, list[str]],
-    "name": str,
-    "dataset": str,
-}
-
-
-def _check(config: dict[str, Any]) -> None:
-    known = {*_SCHEMAS, "command", "reconstruction", "question"}
-    for key in config:
-        if key not in known:
-            raise InputError(schema.unknown_key(key, "", sorted(known)))
-    for key in known - config.keys():
-        raise InputError(f"{key}: is missing from the configuration")
-    for key, kind in _SCHEMAS.items():
-        schema.check(config[key], kind, key)
-    for key in ("name", "dataset"):
-        if not all(word and set(word) <= _NAME and word[0] != "." for word in config[key].split("/")):
-            schema.refuse(key, config[key], "letters, digits, _, - and .")
-    _check_named("command", config["command"], "name", schema.COMMANDS)
-    schema.check(config["reconstruction"], dict[str, dict[str, Any]], "reconstruction")
-    for name, entry in config["reconstruction"].items():
-        _check_named(f"reconstruction.{name}", entry, "method", schema.RECONSTRUCTIONS)
-    if config["command"]["name"] == "file" and not Path(config["command"]["path"]).is_file():
-        schema.refuse("command.path", config["command"]["path"], "the path of an existing file")
-    _check_effects(config["effects"])
-    recording = config["recording"]
-    intervals = recording["duration"] / recording["interval"]
-    if abs(intervals - round(intervals)) > 1e-6:
-        schema.refuse(
-            "recording.duration", recording["duration"], f"a whole number of {recording['interval']} s intervals"
-        )
-    if recording["discard"] > recording["duration"] - 0.15:
-        schema.refuse("recording.discard", recording["discard"], "at least 0.15 s less than recording.duration")
-    if config["sampling"]["shards"] > min(config["sampling"]["runs"], config["sampling"]["fresh"]):
-        schema.refuse("sampling.shards", config["sampling"]["shards"], "no more than sampling.runs and sampling.fresh")
-    _check_space(config["search"]["space"])
-    if config["search"]["reconstruction"] not in config["reconstruction"] and config["search"]["trials"]:
-        schema.refuse(
-            "search.reconstruction", config["search"]["reconstruction"], ", ".join(sorted(config["reconstruction"]))
-        )
-
-
-_NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")
-
-
-def _check_space(space: Mapping[str, Mapping[str, Any]]) -> None:
-    """Check that every end and every value of the space that is searched is one that the setting accepts."""
-    groups = {"network": schema.Network, "training": schema.Training}
-    for section, keys in space.items():
-        if section not in groups:
-            raise InputError(schema.unknown_key(section, "search.space", list(groups)))
-        known = {field.name: field for field in fields(groups[section])}
-        for name, values in keys.items():
-            key = f"search.space.{section}.{name}"
-            if name not in known:
-                raise InputError(schema.unknown_key(name, f"search.space.{section}", list(known)))
-            if isinstance(values, Mapping):
-                if not {"low", "high"} <= set(values) <= {"low", "high", "log", "step"}:
-                    schema.refuse(key, values, "a list of values, or low, high and at will log and step")
-                if values["low"] > values["high"]:
-                    schema.refuse(f"{key}.high", values["high"], f"a number not below {key}.low = {values['low']}")
-                values = [values["low"], values["high"]]
-            for value in values if isinstance(values, list) else [values]:
-                schema.check(value, known[name].type, key, known[name].metadata)
-
-
-def _check_named(key: str, value: Mapping[str, Any], label: str, schemas: Mapping[str, type]) -> None:
-    """Check a group whose entry ``label`` says which schema holds."""
-    chosen = value.get(label) if isinstance(value, Mapping) else value
-    if not isinstance(chosen, str) or chosen not in schemas:
-        schema.refuse(f"{key}.{label}", chosen, ", ".join(schemas))
-    schema.check(value, schemas[chosen], key)
-
-
-def _check_effects(effects: Mapping[str, Mapping[str, float]]) -> None:
-    from .effects import EFFECTS
-
-    for effect, values in effects.items():
-        if effect not in EFFECTS:
-            raise InputError(schema.unknown_key(effect, "effects", list(EFFECTS)))
-        for name in values:
-            if name not in EFFECTS[effect].parameters:
-                raise InputError(schema.unknown_key(name, f"effects.{effect}", list(EFFECTS[effect].parameters)))
 
 
 # --- stages --------------------------------------------------------------------------------------------------------
@@ -524,67 +384,3 @@ def _datasets(path: str, config: Mapping[str, Any]) -> dict[str, str]:
         return dict.fromkeys(parts, path)
     shared = compose(owner) if owner in experiments() else config
     return {p: owner if dataset_spec(shared, p) == dataset_spec(config, p) else path for p in parts}
-
-
-# --- sources -------------------------------------------------------------------------------------------------------
-
-
-@functools.cache
-def source_digest(script: str | Path) -> str:
-    """Digest of a script and of every module of this package that it imports, directly or not.
-
-    Comments, docstrings and layout do not count. Where the catalogue of effects is imported, its files count.
-    """
-    pending, seen = [Path(script)], {}
-    while pending:
-        path = pending.pop()
-        if path not in seen:
-            seen[path], imported = _read_source(path)
-            pending += imported
-    digest = hashlib.sha256("".join(seen[path] for path in sorted(seen)).encode())
-    if PACKAGE / "effects" / "__init__.py" in seen:
-        for path in sorted((CONF / "effect").glob("*.yaml")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-@functools.cache
-def _read_source(path: Path) -> tuple[str, list[Path]]:
-    """Digest of what a module means and the files of this package that it imports."""
-    tree = ast.parse(path.read_bytes())
-    imported = _imports(tree, path)
-    return hashlib.sha256(_meaning(tree).encode()).hexdigest(), imported
-
-
-def _meaning(tree: ast.AST) -> str:
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list) and body and isinstance(body[0], ast.Expr):
-            value = body[0].value
-            if isinstance(value, ast.Constant) and isinstance(value.value, str):
-                body[0] = ast.Pass()
-    return ast.dump(tree)
-
-
-def _imports(tree: ast.AST, path: Path) -> list[Path]:
-    """Files of this package that a module imports anywhere, its packages' own included."""
-    dotted = ""
-    if path.is_relative_to(PACKAGE):
-        dotted = ".".join(("emafault", *path.relative_to(PACKAGE).with_suffix("").parts))
-        dotted = dotted if path.name != "__init__.py" else dotted.removesuffix(".__init__") + "._"
-    names = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            parent = ".".join(dotted.split(".")[: -node.level]) if node.level else ""
-            module = ".".join(part for part in (parent, node.module or "") if part)
-            names += [module, *(f"{module}.{alias.name}" for alias in node.names)]
-    found = []
-    for name in names:
-        words = name.split(".")
-        if words[0] == "emafault":
-            for depth in range(1, len(words) + 1):
-                stem = PACKAGE.joinpath(*words[1:depth])
-                found += [p for p in (stem / "__init__.py", stem.with_suffix(".py")) if p.is_file() and stem != p]
-    return found

@@ -6,13 +6,14 @@ import sys
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from emafault import config as configuration
+from emafault import provenance
 from emafault.errors import InputError
 
 RESULTS = "results"
 
 try:
     PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
-    configuration.check_writable(RESULTS)
+    provenance.check_writable(RESULTS)
 except InputError as error:
     sys.exit(f"emafault: {error}")
 
@@ -32,7 +33,7 @@ wildcard_constraints:
 
 def code(script):
     """Digest of a script and of everything of the package that it imports."""
-    return configuration.source_digest(f"{workflow.basedir}/workflow/scripts/{script}.py")
+    return provenance.source_digest(f"{workflow.basedir}/workflow/scripts/{script}.py")
 
 
 def composed(wildcards):
@@ -47,7 +48,7 @@ def case_files(name):
 
 onstart:
     try:
-        configuration.claim(RESULTS)
+        provenance.claim(RESULTS)
     except InputError as error:
         sys.exit(f"emafault: {error}")
 
