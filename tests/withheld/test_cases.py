@@ -14,16 +14,19 @@ from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.recording import read_recording
 from emafault.withheld.benches import make_cases, rival_distances, simulate_truth
-from emafault.withheld.cases import STRATA, case_from_dict, draw_case
+from emafault.withheld.cases import STRATA, case_from_dict, draw_case, stratum_of
 from emafault.withheld.detectability import Detector
 
 NOISE = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
 IDS = list(EFFECTS)
 
 
+STRONG_STRIBECK = next(s for s in range(IDS.index("stribeck"), 1000, len(IDS)) if stratum_of(s, "T4") == 4)
+
+
 def seed_of(effect: str, stratum: int) -> int:
     """Seed of T1 whose case holds an effect in an amplitude stratum."""
-    return len(IDS) * stratum + IDS.index(effect)
+    return next(s for s in range(IDS.index(effect), 10_000, len(IDS)) if stratum_of(s, "T1") == stratum)
 
 
 def test_imports_nothing_of_the_diagnosis():
@@ -45,9 +48,11 @@ def test_a_case_is_its_seed(rung):
 def test_seeds_go_through_effects_and_amplitudes():
     cases = [draw_case("T1", seed) for seed in range(len(IDS) * STRATA["T1"])]
     assert [next(iter(c.effects)) for c in cases] == IDS * STRATA["T1"]
-    load = [abs(c.effects["load_constant"]["T"]) for c in cases if "load_constant" in c.effects]
+    load = [c for c in cases if "load_constant" in c.effects]
+    load = [abs(c.effects["load_constant"]["T"]) for c in sorted(load, key=lambda c: stratum_of(c.seed, "T1"))]
     assert load == sorted(load)
     assert load[0] < 0.02 and load[-1] > 6.0
+    assert len({stratum_of(seed, "T1") for seed in range(len(IDS))}) > 10
 
 
 def test_values_lie_in_the_catalogue():
@@ -86,7 +91,7 @@ def test_unknown_rung():
 
 def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
     actuator = reference_actuator()
-    (name,) = make_cases("T4", [IDS.index("stribeck") + 4 * len(IDS)], tmp_path / "one", actuator, NOISE)
+    (name,) = make_cases("T4", [STRONG_STRIBECK], tmp_path / "one", actuator, NOISE)
     bench = tmp_path / "one" / "benches" / name
     assert {p.suffix for p in bench.iterdir()} == {".nc"}
     key = json.loads((tmp_path / "one" / "keys" / f"{name}.json").read_text())
@@ -97,7 +102,7 @@ def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
     for recording in recordings:
         assert recording.fault is None
         assert "stribeck" not in str(recording.attributes)
-    make_cases("T4", [IDS.index("stribeck") + 4 * len(IDS)], tmp_path / "two", actuator, NOISE)
+    make_cases("T4", [STRONG_STRIBECK], tmp_path / "two", actuator, NOISE)
     again = read_recording(tmp_path / "two" / "benches" / name / "recording_0.nc")
     np.testing.assert_array_equal(again.phase_voltage, recordings[0].phase_voltage)
 

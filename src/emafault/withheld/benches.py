@@ -17,7 +17,7 @@ from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import simulate, time_axis
 from ..effects import EFFECTS
 from ..recording import Recording, replace_atomically, write_recording
-from .cases import Case, case_from_dict, draw_case
+from .cases import RUNGS, Case, case_from_dict, draw_case
 from .detectability import Detector
 
 STEP = 2e-6  # s, of the other integrator
@@ -82,7 +82,7 @@ def write_bench(
         step = float(runs["speed_quantisation_step"][0])
         if truncate:
             runs["speed_quantisation_step"] = 0.0
-        measured = measure(signals, runs, scaled, 1_000_003 * case.seed + 7919 * len(case.rung + case.name) + n)
+        measured = measure(signals, runs, scaled, len(RUNGS) * case.seed + RUNGS.index(case.rung), n)
         speed = measured["rotor_speed"][0]
         recording = Recording(
             time=time_axis(plan.duration, plan.interval),

@@ -1,7 +1,8 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
-A case is a pure function of its rung and seed. Successive seeds go through the effects in order, and through strata of
-the amplitude after that, so that any run of ``effects x strata`` seeds is balanced.
+A case is a pure function of its rung and seed. Successive seeds go through the effects in order; rounds go through strata
+of the amplitude, each effect beginning elsewhere, so that a single round already holds weak and strong cases and any
+``strata`` rounds are balanced.
 """
 
 from collections.abc import Mapping
@@ -132,7 +133,7 @@ def draw_case(rung: str, seed: int) -> Case:
             effects[str(effect)] = draw_effect(str(effect), 10.0 ** rng.uniform(-1.0, 0.0), rng)
     else:
         effect = ids[seed % len(ids)]
-        stratum = (seed // len(ids)) % STRATA[rung]
+        stratum = stratum_of(seed, rung)
         smallest = SMALLEST.get(effect, USUAL_SMALLEST)
         amplitude = smallest ** (1.0 - (stratum + rng.random()) / STRATA[rung])
         effects[effect] = draw_effect(effect, amplitude, rng)
@@ -151,6 +152,12 @@ def draw_case(rung: str, seed: int) -> Case:
         left_out=single if rung == "T3" else (),
         forms=single if rung == "T4" else (),
     )
+
+
+def stratum_of(seed: int, rung: str) -> int:
+    """Amplitude stratum of a seed, 0 the weakest."""
+    turn, effect = divmod(seed, len(EFFECTS))
+    return (turn + 7 * effect) % STRATA[rung]
 
 
 def draw_tolerances(rng: np.random.Generator) -> dict[str, dict[str, float]]:
