@@ -1,0 +1,96 @@
+"""The actuator's twin: statistics, exact derivatives, and a bench whose effect is named."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.sensors import SensorNoise, measure
+from emafault.actuator.simulate import simulate, time_axis
+from emafault.config import compose, reference_actuator
+from emafault.gap.inference import Problem
+from emafault.gap.which import search
+from emafault.recording import Recording
+from emafault.twins.actuator import ActuatorTwin
+from emafault.twins.actuator_statistics import SIZE, SPECIFICATION, Nominal, compute
+
+ACTUATOR = reference_actuator()
+NOISE = SensorNoise(**compose()["sensors"])
+COMMANDS = (
+    ("parabolic", {"acceleration": 0.4}, 20.0),
+    ("sine", {"amplitude": 0.03, "frequency": 2.0}, 20.0),
+    ("ramp", {"speed": -0.2}, 60.0),
+)
+
+
+def bench(effects, seed=0, noise=NOISE, fault=(0.02, 0.0, 0.03, 0.05, 0.0)):
+    out = {}
+    for n, (command, settings, ambient) in enumerate(COMMANDS):
+        health = "healthy" if n == 0 else "unknown"
+        vector = np.array([*(np.zeros(5) if n == 0 else fault), ambient - 20.0])
+        runs = make_runs(ACTUATOR, vector[None], effects=effects, theta_0=0.4 + n)
+        positions = command_positions(command, settings, 0.5, ACTUATOR.control_period)
+        measured = measure(simulate(runs, positions, 0.5, 2e-4), runs, noise, seed + n)
+        soak = float(measured.pop("ambient_temperature")[0])
+        signals = {k: v[0] for k, v in measured.items()}
+        out[f"{n}"] = Recording(
+            time_axis(0.5, 2e-4), ambient_temperature=soak, attributes={"health": health}, **signals
+        )
+    return out
+
+
+def test_statistics_are_as_many_as_specified_and_vanish_without_gap_or_noise():
+    silent = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
+    recording = bench({}, noise=silent)["0"]
+    signals = {n: getattr(recording, n) for n in ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed")}
+    signals |= {
+        n: getattr(recording, n) for n in ("rotor_angle", "output_position", "commanded_position", "bus_voltage")
+    }
+    found = compute(Nominal.of(ACTUATOR, recording, 0.4), signals)
+    assert len(SPECIFICATION) == SIZE == len(found.values)
+    plateau = [m for m, s in enumerate(SPECIFICATION) if s[0].startswith("plateau")]
+    assert np.abs(found.values[plateau]).max() < 0.01  # V; the noise of one of them is about 0.05 V
+
+
+def test_derived_derivatives_agree_with_differences():
+    twin = ActuatorTwin(ACTUATOR, bench({}), NOISE, threads=1)
+    problem = Problem(twin, twin.names)
+    values = np.array([p.off if p.effect else p.mean for p in problem.parameters])
+    prediction = problem.predict(values)[0]
+    exact = problem.nuisance_jacobian(values, prediction, problem.nuisances)
+    for name, step in (("unit_calibration.k_scale", 0.01), ("2.dT", 5.0)):
+        m = problem.names[name]
+        moved = values.copy()
+        moved[m] += step
+        difference = (problem.predict(moved)[0] - prediction) / step
+        column = exact[:, problem.nuisances.index(m)]
+        # single differences scatter with the switching: the direction and the size must agree
+        cosine = column @ difference / np.linalg.norm(column) / np.linalg.norm(difference)
+        assert cosine > 0.995
+        assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("effects", "named"),
+    [
+        ({}, ()),
+        ({"magnet_temperature": {"alpha_m": -6e-4}}, ("magnet_temperature",)),
+        ({"voltage_gain": {"g_a": 1.008, "g_b": 0.995, "g_c": 1.0}}, ("voltage_gain",)),
+        ({"speed_latency": {"tau": 2e-3}}, ("speed_latency",)),
+    ],
+)
+def test_the_effect_of_a_bench_is_found_with_its_size(effects, named):
+    twin = ActuatorTwin(ACTUATOR, bench(effects, seed=7), NOISE, threads=2)
+    problem = Problem(twin, twin.names)
+    found = search(problem, twin.hypotheses, 6.0)
+    best = found.candidates[0].effects if found.candidates and found.candidates[0].gain > 6.0 else ()
+    assert best == named
+    if named:
+        effect = named[0]
+        name, value = next(iter(effects[effect].items()))
+        m = problem.names[f"{effect}.{name}"]
+        point = found.candidates[0].point
+        deviation = np.sqrt(point.covariance[point.free.index(m), point.free.index(m)])
+        assert abs(point.values[m] - value) < 4.0 * deviation + 0.02 * abs(value)

@@ -1,0 +1,121 @@
+"""The machine-independent core against closed forms, on a linear twin that has nothing to do with an actuator."""
+
+import numpy as np
+import pytest
+
+from emafault.gap.decide import Calibration, decide, held_out_features
+from emafault.gap.how_far import closed
+from emafault.gap.inference import Problem
+from emafault.gap.twin import Cell, Hypothesis, Parameter
+from emafault.gap.which import families, search
+
+
+class Lines:
+    """y = offset + slope x + curvature x^2 + step (x > 0), two recordings, independent noise of known size."""
+
+    name = "lines"
+    sigma = 0.1
+
+    def __init__(
+        self, seed: int, curvature: float = 0.0, step: float = 0.0, outside: float = 0.0, library=("curve", "step")
+    ):
+        self.x = np.linspace(-1.0, 1.0, 40)
+        rng = np.random.default_rng(seed)
+        self.data = {}
+        for name in ("one", "two"):
+            y = 0.3 + 1.2 * self.x + curvature * self.x**2 + step * (self.x > 0) + outside * np.sin(9 * self.x)
+            self.data[name] = y + self.sigma * rng.standard_normal(len(self.x))
+        self.parameters = [
+            Parameter("unit.offset", "1", 0.0, 0.0, 1.0, -5, 5, 0.01),
+            Parameter("unit.slope", "1", 1.0, 1.0, 1.0, -5, 5, 0.01),
+            Parameter("curve.a", "1", 0.0, 0.0, 1.0, -5, 5, 0.01, "curve"),
+            Parameter("step.a", "1", 0.0, 0.0, 1.0, -5, 5, 0.01, "step"),
+        ]
+        every = {"curve": ("curve.a",), "step": ("step.a",)}
+        self.hypotheses = [Hypothesis(e, ("line",), every[e], ((0.5,),)) for e in library]
+
+    def cells(self, part):
+        return [Cell(n, "line", "x", float(x), float(x), f"bin {k // 8}") for n in part for k, x in enumerate(self.x)]
+
+    def observed(self, part):
+        return np.concatenate([self.data[n] for n in part])
+
+    def predict(self, values, part):
+        x = np.tile(self.x, len(part))
+        return np.array([v[0] + v[1] * x + v[2] * x**2 + v[3] * (x > 0) for v in np.atleast_2d(values)])
+
+    def covariance(self, values, part):
+        return self.sigma**2 * np.eye(len(part) * len(self.x))
+
+
+def design(twin, columns):
+    x = np.tile(twin.x, 2)
+    return np.stack([np.ones_like(x), x, x**2, (x > 0).astype(float)], axis=1)[:, columns]
+
+
+def test_null_fit_is_the_gaussian_posterior():
+    twin = Lines(1)
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    A, y = design(twin, [0, 1]), twin.observed(["one", "two"])
+    H = A.T @ A / twin.sigma**2 + np.eye(2)
+    expected = np.linalg.solve(H, A.T @ y / twin.sigma**2 + np.array([0.0, 1.0]))
+    assert null.values[:2] == pytest.approx(expected, rel=1e-6)
+    assert null.covariance == pytest.approx(np.linalg.inv(H), rel=0.03)
+
+
+def test_gain_in_evidence_is_the_exact_ratio_of_marginal_likelihoods():
+    twin = Lines(2, curvature=0.4)
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    found = {c.effects[0]: c for c in problem.screen(null, twin.hypotheses)}
+    y, mean = twin.observed(["one", "two"]), np.array([0.0, 1.0])
+
+    def log_marginal(columns, prior):
+        A = design(twin, columns)
+        C = twin.sigma**2 * np.eye(len(y)) + A @ A.T
+        # the core trusts no correlation to the last digit, which here changes nothing: the noise is white
+        r = y - A @ prior
+        return -0.5 * (r @ np.linalg.solve(C, r) + np.linalg.slogdet(C)[1])
+
+    exact = log_marginal([0, 1, 2], np.array([*mean, 0.0])) - log_marginal([0, 1], mean)
+    assert found["curve"].gain == pytest.approx(exact, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("truth", "named"),
+    [
+        ({"curvature": 0.5}, ("curve",)),
+        ({"step": 0.5}, ("step",)),
+        ({"curvature": 0.6, "step": 0.6}, ("curve", "step")),
+    ],
+)
+def test_search_names_the_effects_in_the_data(truth, named):
+    twin = Lines(3, **truth)
+    found = search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0)
+    assert tuple(sorted(found.candidates[0].effects)) == named
+
+
+def test_what_the_library_lacks_is_left_over_and_called_unknown():
+    twin = Lines(4, outside=0.8)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    decision = decide(problem, found, twin.hypotheses, Calibration.load())
+    assert decision.verdict == "unknown"
+    assert families(problem, found.null.prediction)[0].excess > 5.0
+
+
+def test_probabilities_sum_to_one():
+    twin = Lines(5, curvature=0.15)
+    problem = Problem(twin, ["one", "two"])
+    decision = decide(problem, search(problem, twin.hypotheses, 3.0), twin.hypotheses, Calibration.load())
+    assert sum(p for _, p in decision.sets) + decision.empty + decision.unknown == pytest.approx(1.0)
+
+
+def test_closed_share_and_its_absence_below_the_noise():
+    assert closed(3.0, 1.0, 1.0, 400) == pytest.approx(1.0)
+    assert closed(3.0, 3.0, 1.0, 400) == pytest.approx(0.0)
+    assert closed(1.01, 1.0, 1.0, 400) is None
+    assert held_out_features(1.0, 1.0, 400) is None
+    worse = held_out_features(2.0, 2.5, 400)
+    assert worse is not None and worse[1] > 0.0
