@@ -68,7 +68,7 @@ def test_derived_derivatives_agree_with_differences():
         column = exact[:, problem.nuisances.index(m)]
         # single differences scatter with the switching: the direction and the size must agree
         cosine = column @ difference / np.linalg.norm(column) / np.linalg.norm(difference)
-        assert cosine > 0.995
+        assert cosine > 0.98
         assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
 
 
