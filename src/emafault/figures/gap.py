@@ -59,7 +59,9 @@ def draw_map(
     for ax in axes[:1, 0]:
         ax.set_title(panels[0][0], loc="left", pad=26 if len(columns) > 4 else 18)
     bar = fig.colorbar(image, ax=axes[:, 0], shrink=0.8, pad=0.01)
-    bar.set_label("misfit beyond the noise (standard deviations)")
+    bar.set_label(
+        "misfit beyond noise\n(standard deviations)" if height < 5 else "misfit beyond the noise (standard deviations)"
+    )
     bar.outline.set_visible(False)  # type: ignore[operator]
     return fig
 
@@ -70,7 +72,7 @@ def draw_recordings(
     """Equation by recording: root mean square of z before and after; the last ``confirm`` recordings were held out."""
     panels = [("before", before)] + ([("after", after)] if after is not None else [])
     fig, axes = plt.subplots(
-        1, len(panels), figsize=(2.2 + 0.62 * len(names) * len(panels) + 1.2, 0.27 * len(rows) + 1.9),
+        1, len(panels), figsize=(10.5, 0.25 * len(rows) + 2.1),
         squeeze=False, sharey=True,
     )  # fmt: skip
     norm = LogNorm(0.8, max(20.0, float(np.nanmax(before, initial=1.0))))
@@ -155,7 +157,9 @@ def draw_ranking(entries: Sequence[Mapping[str, Any]]) -> plt.Figure:
 def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.Figure:
     """How far: root mean square misfit of each model on the held-out recordings, for signal, features, fault vector."""
     shown = {k: v for k, v in rungs.items() if v}
-    fig, axes = plt.subplots(1, len(shown), figsize=(3.6 * len(shown) + 0.8, 2.9), squeeze=False)
+    fig, axes = plt.subplots(1, 3, figsize=(11, 2.9), squeeze=False)
+    for ax in axes[0, len(shown) :]:
+        ax.set_axis_off()
     names = ("nominal", "recalibrated", "placebo", "after", "floor")
     colours = dict(zip(names, ("#b9b9b5", BEFORE, "#dcae7c", AFTER, FLOOR)))
     units = {

@@ -17,6 +17,7 @@ from .words import cannot_tell, consequence, effect_words, finding, number
 
 NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
+TABLED = 14  # parameters in the table
 HARDLY = 1.0  # of the prior's width: smallest visible size from which an effect would hardly have shown
 RETRAINED = ("<!-- retrained -->", "<!-- /retrained -->")
 
@@ -224,17 +225,12 @@ def _which(page: Page, diagnosis: Diagnosis) -> None:
         if entry.get("parameters") and (entry["probability"] > 1e-3 or entry is verdict["which"][0]):
             for name, p in entry["parameters"].items():
                 units = "" if p["units"] == "1" else p["units"]
-                rows.append(
-                    [
-                        effect_words(entry["effects"]),
-                        name,
-                        number(p["value"]),
-                        f"{number(p['low'])} to {number(p['high'])}",
-                        units,
-                    ]
-                )
+                interval = f"{number(p['low'])} to {number(p['high'])}"
+                rows.append([effect_words([p["effect"]]), name, number(p["value"]), interval, units])
     if rows:
-        page.table(["effects", "parameter", "value", "90 % interval", "unit"], rows)
+        page.table(["effect", "parameter", "value", "90 % interval", "unit"], rows[:TABLED])
+    if len(rows) > TABLED:
+        page.paragraph(f"{len(rows) - TABLED} more parameters stand in the verdict file.", "small")
     rivals = verdict.get("held_out", {}).get("rivals") or []
     if len(rivals) > 1:
         page.paragraph("The same readings on the recordings that took no part, best first:")

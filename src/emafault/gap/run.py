@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..actuator.sensors import SensorNoise
 from ..effects import EFFECTS
 from ..errors import InputError
 from ..progress import say
-from ..recording import replace_atomically
+from ..recording import Recording, replace_atomically
 from .bench import Bench, read_bench, split_bench
 from .decide import Calibration
 from .diagnose import Diagnosis, diagnose
@@ -32,6 +32,7 @@ class Diagnosed:
     truths: Mapping[str, np.ndarray]
     region: Any = None
     experiment: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def verdict(self) -> dict:
@@ -161,7 +162,15 @@ def diagnose_recordings(
     values = best.point.values if best is not None else found.found.null.values
     effects = actuator_experiments.catalogue_effects(twin, values, best.effects if best is not None else ())
     text = experiment_text(verdict, effects, f"diagnosed_{_file_name(bench.name)}")
-    return Diagnosed(found, truths, worst_region(found), text)
+    return Diagnosed(found, truths, worst_region(found), text, {n: _label(n, r) for n, r in recordings.items()})
+
+
+def _label(name: str, recording: Recording) -> str:
+    """How figures call a recording: file, command, temperature, health."""
+    stem = name.removesuffix(".nc").removeprefix("recording_")
+    command = recording.attributes.get("command", "")
+    parts = [stem, command if command != "unknown" and command not in stem else ""]
+    return " ".join(p for p in parts if p) + f", {recording.ambient_temperature:.0f} °C, {recording.health}"
 
 
 def diagnose_measured(path: Path, twin: str, exclude: Sequence[str] = ()) -> dict[str, Diagnosed]:
@@ -197,7 +206,8 @@ def write_case(folder: Path, found: Diagnosed) -> None:
     _write(folder / VERDICT, to_json(found.verdict))
     if found.experiment:
         _write(folder / EXPERIMENT, found.experiment)
-    write_report(found.diagnosis, folder / REPORT, found.truths, found.region, section(folder, found.verdict))
+    retrained = section(folder, found.verdict)
+    write_report(found.diagnosis, folder / REPORT, found.truths, found.region, retrained, found.labels)
 
 
 def to_json(value: Any) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 #: excess of a family from which "clearly" is said
 _CLEAR = 10.0
+MOST = 3  # parameters named in a sentence
 
 
 def effect_words(effects: Sequence[str]) -> str:
@@ -19,12 +20,13 @@ def number(value: float) -> str:
 
 
 def parameter_words(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    """Parameters with units and 90 % intervals."""
+    """The first parameters with units and 90 % intervals."""
     parts = []
-    for name, p in parameters.items():
+    for name, p in list(parameters.items())[:MOST]:
         units = "" if p["units"] == "1" else f" {p['units']}"
         parts.append(f"{name} = {number(p['value'])}{units} ({number(p['low'])} to {number(p['high'])})")
-    return ", ".join(parts)
+    more = len(parameters) - MOST
+    return ", ".join(parts) + (f" and {more} more" if more > 0 else "")
 
 
 def finding(verdict: Mapping[str, Any]) -> str:
@@ -53,44 +55,46 @@ def finding(verdict: Mapping[str, Any]) -> str:
                     f"{number(signal['after'])} times the noise."
                 )
         return text + (f" The difference is largest in {_place(where[0])}." if where else "")
+    claimed, held_out = _held_out(verdict)
     names = effect_words(first["effects"])
     if kind == "group":
         members = [e for e in verdict["which"] if e.get("group")]
         total = sum(e["probability"] for e in members)
-        listed = " or ".join(effect_words(e["effects"]) for e in members)
-        text = (
-            f"One of these explains the gap, these recordings cannot say which: {listed} (together {_percent(total)})."
-        )
+        listed = "; or ".join(effect_words(e["effects"]) for e in members)
+        verb = "explains the gap" if claimed else "would explain the explored recordings"
+        text = f"One of these {verb}, these recordings cannot say which: {listed} (together {_percent(total)})."
     else:
-        text = f"{names[0].upper()}{names[1:]} explains the gap with probability {_percent(first['probability'])}: "
+        several = len(first["effects"]) > 1
+        verb = f"explain{'' if several else 's'} the gap" if claimed else "would explain the explored recordings"
+        text = f"{names[0].upper()}{names[1:]} {verb} with probability {_percent(first['probability'])}: "
         text += f"{parameter_words(first['parameters'])}."
-    if kind == "partly":
+    if kind == "partly" and claimed:
         remains = verdict.get("remains") or []
         text += " A remainder stays unexplained" + (f", largest in {_place(remains[0])}." if remains else ".")
-    return text + _held_out(verdict)
+    return text + held_out
 
 
-def _held_out(verdict: Mapping[str, Any]) -> str:
-    """What the confirm recordings say of a named set."""
+def _held_out(verdict: Mapping[str, Any]) -> tuple[bool, str]:
+    """Whether anything is claimed once the confirm recordings are seen, and what they say."""
     signal = verdict["shrinks"]["signal"]
     if signal is None:
-        return " No recording was held out, so nothing confirms it."
+        return True, " No recording was held out, so nothing confirms it."
     before, after, placebo = signal["recalibrated"], signal["after"], signal["placebo"]
-    figures = f"the misfit falls from {number(before)} to {number(after)} times the noise"
-    figures += f" (a random effect: {number(placebo)})"
-    outcome = verdict.get("held_out", {}).get("outcome", "holds")
+    held_out = verdict.get("held_out", {})
+    outcome = held_out.get("outcome", "holds")
     if outcome == "contradicted":
-        return (
-            " The recordings that took no part contradict it: there the misfit goes from "
-            f"{number(before)} to {number(after)} times the noise, so it is not claimed."
+        return False, (
+            f" The recordings that took no part contradict it: there the misfit goes from {number(before)} to "
+            f"{number(after)} times the noise, so it is not claimed."
         )
     if outcome == "not seen":
-        return " The recordings that took no part show too little of the gap to confirm or refute it."
+        return True, " The recordings that took no part show too little of the gap to confirm or refute it."
     if outcome == "rival":
-        kept = verdict["held_out"]["claimed"]
+        kept = held_out["claimed"]
         left = f"only {effect_words(kept)} is claimed" if kept else "nothing is claimed"
-        return f" On recordings that took no part another set does better; {left}."
-    return f" On recordings that took no part {figures}."
+        return bool(kept), f" On the recordings that took no part another set does better; {left}."
+    figures = f"the misfit falls from {number(before)} to {number(after)} times the noise"
+    return True, f" On recordings that took no part {figures} (with a random effect: {number(placebo)})."
 
 
 def consequence(verdict: Mapping[str, Any]) -> str:
