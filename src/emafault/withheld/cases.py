@@ -1,8 +1,8 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
-A case is a pure function of its rung and seed. Successive seeds go through the effects in order; rounds go through strata
-of the amplitude, each effect beginning elsewhere, so that a single round already holds weak and strong cases and any
-``strata`` rounds are balanced.
+A case is a pure function of its rung and seed. Successive seeds go through the effects in order; rounds go through
+strata of the amplitude, each effect beginning elsewhere, so that a single round already holds weak and strong cases and
+any ``strata`` rounds are balanced.
 """
 
 from collections.abc import Mapping
