@@ -277,6 +277,10 @@ def _bounded(information: np.ndarray, gradient: np.ndarray, low: np.ndarray, hig
     return lsq_linear(root, target, bounds=(low * size - 1e-12, high * size + 1e-12)).x / size
 
 
+#: effects that have no meaning or no stable loop much outside their ranges
+KEPT_IN_RANGE = ("back_emf_shape", "compliance", "dynamic_eccentricity", "speed_latency", "stribeck", "virtual_neutral")
+
+
 class Coordinates:
     """Smooth coordinates in which an effect is fitted: its parameters, or what replaces them where singular."""
 
@@ -288,6 +292,9 @@ class Coordinates:
         self.low = np.array([min(p.low, p.nominal) for p in chosen])
         self.high = np.array([max(p.high, p.nominal) for p in chosen])
         self.off = np.array([p.nominal for p in chosen])
+        if EFFECTS[effect].kind == "structural" and effect not in KEPT_IN_RANGE:
+            # beyond the realistic range as well: data that cannot tell two effects apart are not helped by a range
+            self.low, self.high = self.off + 2.0 * (self.low - self.off), self.off + 2.0 * (self.high - self.off)
         self.start = self.off.copy()
         if effect == "dynamic_eccentricity":  # d cos psi, d sin psi
             self.low, self.high, self.off = np.full(2, -0.06), np.full(2, 0.06), np.zeros(2)
@@ -314,7 +321,7 @@ class Coordinates:
         if self.effect == "virtual_neutral":
             return np.array([1.0]) if at[0] < 0.5 else np.array([-1.0])
         reach = self.high - self.low
-        return np.where(at + 0.3 * reach <= self.high, 0.3, -0.3) * reach
+        return np.where(at + 0.2 * reach <= self.high, 0.2, -0.2) * reach
 
 
 COORDINATES = {effect: Coordinates(effect) for effect in EFFECTS}
