@@ -94,7 +94,7 @@ def read_command(path: str | Path, duration: float, control_period: float) -> np
 
 
 def resample(time: np.ndarray, position: np.ndarray, duration: float, control_period: float) -> np.ndarray:
-    """Interpolate positions (rad) given at times (s) linearly to the control ticks; before the first, from zero at t = 0."""
+    """Interpolate positions (rad) at times (s) linearly to the control ticks; before the first, from zero at t = 0."""
     ticks = control_period * np.arange(round(duration / control_period) + 2)
     if time[0] > 0.0:
         first = position[0] - (position[1] - position[0]) / (time[1] - time[0]) * time[0]

@@ -2,9 +2,9 @@
 
 Between two events the three-phase circuit is linear (or smoothly saturating) and the currents follow a four-term Taylor
 series; speed and angle follow the cubic and quartic that this torque gives. A segment ends at the earliest of: control
-tick, recording instant, comparator trip, edge of a cell (commutation or corner of the trapezoid), free-wheel current zero,
-a floating terminal reaching a rail, stop, break-away, end stop, contact of the play. Recorded means are exact integrals of
-the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be stepped in a debugger.
+tick, recording instant, comparator trip, edge of a cell (commutation or corner of the trapezoid), free-wheel current
+zero, a floating terminal reaching a rail, stop, break-away, end stop, contact of the play. Recorded means are exact
+integrals of the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be stepped in a debugger.
 """
 
 import numpy as np
@@ -370,7 +370,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 if te < h:
                     h, event = te, 6
         if compliant:
-            # the sign of the rate decides at the very edge of the play, where rounding would flip the contact to and fro
+            # the sign of the rate decides at the very edge of the play, where rounding would flip the contact
             if contact != 0:
                 gap, gap_1, gap_2 = contact * twist - half_play, contact * twist_1, 0.5 * contact * twist_2
                 if gap > 0.0:

@@ -1,4 +1,4 @@
-"""Parameters of one simulated run: the actuator's own, the fault, the conditions and one field for every effect parameter.
+"""Parameters of one simulated run: the actuator's own, the fault, the conditions and those of every effect.
 
 A run is a record of a NumPy structured array, so that thousands of runs are one array and the compiled simulation reads
 fields by name. The field of parameter ``a`` of effect ``stribeck`` is ``stribeck_a``.

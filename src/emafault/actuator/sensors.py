@@ -36,8 +36,8 @@ def measure(
 ) -> dict[str, np.ndarray]:
     """Add noise, then rounding, to simulated signals and measure the ambient temperature.
 
-    Each run has a generator of its own seeded by (seed, first_run + row), so that the result does not depend on how runs
-    are shared out. Order of the sensing chain after the simulation: noise, rounding.
+    Each run has a generator of its own seeded by (seed, first_run + row), so that the result does not depend on how
+    runs are shared out. Order of the sensing chain after the simulation: noise, rounding.
 
     Returns
     -------

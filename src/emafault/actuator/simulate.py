@@ -1,6 +1,7 @@
 """Simulation of batches of runs: noise-free recorded signals from run records and a command."""
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,8 +39,8 @@ def simulate(
 
     Returns
     -------
-    phase_voltage (V), phase_current (A), phase_current_end (A): (run, time, phase); rotor_speed (rad/s), rotor_angle (rad),
-    output_position (rad), commanded_position (rad), bus_voltage (V): (run, time)
+    phase_voltage (V), phase_current (A), phase_current_end (A): (run, time, phase); rotor_speed (rad/s),
+    rotor_angle (rad), output_position (rad), commanded_position (rad), bus_voltage (V): (run, time)
 
     Raises
     ------
@@ -66,7 +67,7 @@ def simulate(
         pieces = min(n, 4 * threads)
         bounds = np.linspace(0, n, pieces + 1).astype(int)
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(part, [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:]) if b > a]))
+            list(pool.map(part, [slice(a, b) for a, b in pairwise(bounds) if b > a]))
     position = commanded_position(command, float(runs["control_period"][0]), time)
     out["commanded_position"] = np.broadcast_to(position, (n, len(time))).copy() if shared else position
     return out
