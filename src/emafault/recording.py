@@ -169,7 +169,7 @@ def _read_open(path: Path, file) -> Recording:
             raise InputError(f"{path}: {name} has unit '{got}', the format asks for '{unit}'")
         if not np.issubdtype(variable.dtype, np.number):
             raise InputError(f"{path}: {name} is not numeric")
-        data = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
+        data: np.ndarray = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
         if not np.all(np.isfinite(data)):
             raise InputError(f"{path}: {name} holds NaN, infinite or missing values; none are accepted")
         return data
