@@ -2,18 +2,22 @@
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import emafault.withheld
+from emafault.actuator.commands import command_positions
+from emafault.actuator.fixed_step import simulate_fixed_step
+from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.recording import read_recording
-from emafault.withheld.benches import make_cases, rival_distances, simulate_truth
+from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth
 from emafault.withheld.cases import STRATA, case_from_dict, draw_case, stratum_of
 from emafault.withheld.detectability import Detector
 
@@ -117,6 +121,18 @@ def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
 def detector(effect: str, stratum: int) -> Detector:
     case = draw_case("T1", seed_of(effect, stratum))
     return Detector(case, reference_actuator(), NOISE, simulate_truth(case, reference_actuator()))
+
+
+def test_the_two_integrators_cannot_be_told_apart():
+    """What T4 shows is its other form, not its other integrator."""
+    case = replace(draw_case("T4", STRONG_STRIBECK), effects={}, forms=())
+    actuator, signals = reference_actuator(), []
+    for plan in case.recordings:
+        runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
+        command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
+        signals.append(simulate_fixed_step(runs, command, plan.duration, plan.interval, STEP))
+    found = Detector(case, actuator, NOISE, signals)
+    assert found.squared(found.delta) < 6.0
 
 
 def test_distance_grows_with_the_amplitude():

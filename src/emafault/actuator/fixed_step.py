@@ -1,9 +1,9 @@
 """The same actuator written a second time, on a fixed step: oracle of the tests, other integrator of blind cases.
 
-Nothing here is shared with the event-driven simulation but the run record. Inside a step only the free-wheel current's
-zero and the comparator's trips are hit exactly; everything else is rounded to the step. Every effect also has an
-alternative *form* (LuGre friction for Stribeck, a two-node thermal network, a rounded back-EMF table, ...), for cases
-in which the library's formula is not the truth.
+Nothing here is shared with the event-driven simulation but the run record. Inside a step only commutations, the
+free-wheel current's zero and the comparator's trips are hit exactly; everything else is rounded to the step.
+Every effect also has an alternative *form* (LuGre friction for Stribeck, a two-node thermal network, a rounded
+back-EMF table, ...), for cases in which the library's formula is not the truth.
 """
 
 from collections.abc import Collection
@@ -323,9 +323,22 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
             if forms[F_ANGLE]:
                 seen += 0.2 * offset * np.cos(theta)
             plus, minus = _active_pair(seen, edges)
+            turn = p * dt * w_mid
+            next_plus, next_minus = _active_pair(seen + turn, edges)
+            until_edge = 2.0 * dt
+            if next_plus != plus or next_minus != minus:
+                low, high = 0.0, 1.0
+                for _ in range(30):
+                    half = 0.5 * (low + high)
+                    now_plus, now_minus = _active_pair(seen + half * turn, edges)
+                    if now_plus == plus and now_minus == minus:
+                        low = half
+                    else:
+                        high = half
+                until_edge = high * dt
             drift = 1.0 + (0.3 * (now - 0.5) if forms[F_OFFSET] else 0.0)
 
-            # currents through the step, cut at comparator trips and free-wheel zeros
+            # currents through the step, cut at commutations, comparator trips and free-wheel zeros
             torque = loss = charge = 0.0
             left, cuts = dt, 0
             while left > 1e-15 and cuts < 60:
@@ -358,7 +371,7 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
                 if diode[off] != 0.0:
                     conducts[off] = True
                     base[off] = -Vf if diode[off] > 0.0 else bus + Vf
-                tau = left
+                tau = min(left, until_edge)
                 _advance(i, tau, base, Rds, R, L, s, smooth, e, conducts, k1, middle, k2, new)
                 # each event shortens the step to its own crossing, so that the earlier of two is what remains
                 ended = False
@@ -426,6 +439,9 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
                     i[plus] = 0.5 * (i[plus] - i[minus])
                     i[minus] = -i[plus]
                 left -= tau
+                until_edge -= tau
+                if until_edge <= 1e-15:
+                    plus, minus, until_edge = next_plus, next_minus, 2.0 * dt
             torque /= dt
 
             # mechanics over the step

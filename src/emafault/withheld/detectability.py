@@ -218,11 +218,12 @@ class Detector:
         others = [e for e in self.case.effects if e != effect]
         if not others or any(EFFECTS[e].kind != "calibration" for e in others):
             return np.inf
-        cost = 0.0
-        for e, name, sd in self.tolerances:
-            if e in others:
-                cost += ((self.case.effects[e][name] - self.unit[e][name]) / sd) ** 2
-        return cost
+        return sum(self._own_cost(e) for e in others)
+
+    def _own_cost(self, effect: str) -> float:
+        """Squared distance of a calibration effect of the truth from the unit's own tolerance draw."""
+        drawn, value = self.unit[effect], self.case.effects[effect]
+        return sum(((value[n] - drawn[n]) / sd) ** 2 for e, n, sd in self.tolerances if e == effect)
 
     def linear_distance(self, shift: np.ndarray, design: np.ndarray) -> float:
         """Squared distance from a shift to the span of some columns, nuisances marginalised, all to first order."""
@@ -253,6 +254,8 @@ class Detector:
             rest = self.delta - self.shift(None, {e: self.case.effects[e] for e in others})
             distance = self.linear_distance(rest, np.concatenate([design[e] for e in others], 1))
             members[effect] = max(0.0, distance - self.repeat)
+            if EFFECTS[effect].kind == "calibration":
+                members[effect] = min(members[effect], self._own_cost(effect))
         return Detectability(nominal, members, self._fault_sd(list(design.values())))
 
     def _fault_sd(self, design: Sequence[np.ndarray]) -> list[list[float] | None]:
