@@ -10,7 +10,6 @@ from .inference import Candidate, Point, Problem
 from .twin import Hypothesis
 
 FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
-CERTAIN = 1.0  # standard deviations of the fit by which it must lie beyond
 GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same trace
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
@@ -59,12 +58,9 @@ def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
 
 
 def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances by more than its uncertainty."""
-    for m in problem.effect_parameters(hypothesis):
-        deviation = float(np.sqrt(point.covariance[point.free.index(m), point.free.index(m)]))
-        if abs(point.values[m] - problem.mean[m]) - CERTAIN * deviation > FAR_OUTSIDE * problem.sd[m]:
-            return True
-    return False
+    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances."""
+    own = problem.effect_parameters(hypothesis)
+    return any(abs(point.values[m] - problem.mean[m]) > FAR_OUTSIDE * problem.sd[m] for m in own)
 
 
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
@@ -96,7 +92,8 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             break
         rounds = 3 if candidate.gain > 0.5 * singles[0].gain else 2
         accept(problem.refine(null, candidate, by_id, rounds))
-        count += 1
+        # every start of the leading effect is followed: a linearised gain does not tell a good start from a bad one
+        count += effect != singles[0].effects[0]
     beam = _best(tried, 1)[:2]
     for round_ in range(REBASES):
         if not beam or beam[0].gain < STRONG:

@@ -15,12 +15,13 @@ from ..faults import FAULT_NAMES
 from ..gap.twin import Cell, Hypothesis, Parameter
 from ..recording import Recording
 from .actuator_noise import CHANNELS, channel_spread, noise_covariance
-from .actuator_statistics import _COMMUTATION, LATTICE, SIZE, Computed, Nominal, cells_of, compute
+from .actuator_statistics import _COMMUTATION, _SPEED, LATTICE, SIZE, Computed, Nominal, cells_of, compute
 
 HEALTHY_DEVIATION = 5e-4  # of N and xi in a recording called healthy (the format allows 1e-3)
 SOAK_DEVIATION = 0.5  # K, of the true ambient temperature about the measured
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
+ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 6
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
@@ -35,7 +36,7 @@ _TOLERANCES = {
 #: starts of a fit where half the range in every parameter would not do
 _STARTS: dict[str, tuple[tuple[float, ...], ...]] = {
     "stribeck": ((0.01, 4.0), (0.01, 12.0)),
-    "compliance": ((2.5e-4, 300.0), (8e-5, 300.0)),
+    "compliance": ((4.5e-4, 300.0), (2e-4, 300.0), (7e-5, 300.0)),
     "dynamic_eccentricity": ((0.01, 0.01),),
     "back_emf_shape": ((112.0, 0.01, 0.01),),
     "self_heating": ((0.1,),),
@@ -423,7 +424,11 @@ class ActuatorTwin:
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            if b.jitter is None or b.settled in (0, 1, 3):  # the second of a null fit's two rounds moves too little to simulate it anew
+            if b.jitter is None or b.settled in (
+                0,
+                1,
+                3,
+            ):  # the second of a null fit's two rounds moves too little to simulate it anew
                 repeats = []
                 command = b.command
                 for shift, offset in zip(shifts[name], offsets[name], strict=True):
@@ -440,6 +445,9 @@ class ActuatorTwin:
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
             extra = 2.0 * jitter + (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
             extra[_COMMUTATION:] += aligned
+            # a speed that changes slowly is rounded the same way for many samples on end
+            step = float(run["speed_quantisation_step"])
+            extra[_SPEED:LATTICE] += ROUNDED_ALIKE * step**2 / 12.0
             cov[np.diag_indices(SIZE)] += extra + 1e-18
             return cov[np.ix_(b.usable, b.usable)]
 

@@ -36,7 +36,7 @@ CHANNELS = {
     "position": "output_position",
     "bus_voltage": "bus_voltage",
 }
-LATTICE_DEVIATION = 0.02  # rad/s
+LATTICE_DEVIATION = 2e-3  # rad/s
 
 
 def third_difference_deviation(values: np.ndarray) -> float:

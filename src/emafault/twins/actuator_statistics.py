@@ -436,15 +436,19 @@ def fill_statistics(
         for j in range(3):
             for m in (3, 4, 16):
                 count[j * _PER_PHASE + m] = 0
-    # lattice of a rounded speed: the spacing of its values where values repeat, else zero
+    # lattice of a rounded speed: the smallest spacing of its values where all spacings are multiples of it, else zero
     ordered = np.sort(speed)
-    distinct, spacing = 1, 1.0e9
+    spacing = 1.0e9
     for n in range(1, n_time):
         gap = ordered[n] - ordered[n - 1]
         if gap > 1e-9:
-            distinct += 1
             spacing = min(spacing, gap)
-    y[LATTICE] = spacing if distinct < n_time // 4 else 0.0
+    odd = 0
+    for n in range(1, n_time):
+        times = (ordered[n] - ordered[n - 1]) / spacing
+        if abs(times - np.round(times)) > 1e-3:
+            odd += 1
+    y[LATTICE] = spacing if spacing > 1e-4 and spacing < 1.0e8 and odd < 0.01 * n_time else 0.0
     count[LATTICE] = n_time
     norm[LATTICE] = 1.0
     y[OSCILLATION] = np.sqrt(play_power / n_time)
