@@ -15,6 +15,7 @@ include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/identification.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/measured.smk"
+include: "workflow/rules/gap.smk"
 include: "workflow/rules/withheld.smk"
 
 

@@ -288,6 +288,41 @@ def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     return recursively_sorted(_pick(config, "actuator", "sensors", "tracking"))
 
 
+def retraining_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What training a network for a diagnosed bench reads; the reconstruction is the most accurate configured."""
+    methods = config["reconstruction"]
+    method = next((m for m in ("weighted_floating", "weighted") if m in methods), list(methods)[-1])
+    spec = {
+        "dataset": dataset_spec(config, "training"),
+        "reconstruction": methods[method],
+        "seeds": min(3, config["evaluation"]["seeds"]),
+    }
+    return recursively_sorted(spec | _pick(config, "faults", "network", "training"))
+
+
+def bench_name(bench: str) -> str:
+    """Name under which a bench's diagnosis stands among the results."""
+    path = Path(bench)
+    return (path.resolve().name if path.is_dir() else path.stem) or "none"
+
+
+def bench_files(bench: str) -> list[str]:
+    """Files of a bench, in order of name.
+
+    Raises
+    ------
+    InputError : no bench given, or a path that does not exist
+    """
+    path = Path(bench)
+    if not bench:
+        raise InputError("bench: none given, --config bench=PATH names a folder of recordings")
+    if path.is_dir():
+        return sorted(str(p) for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+    if not path.is_file():
+        raise InputError(f"bench: {bench}: no such file or folder")
+    return [bench]
+
+
 def withheld_draws() -> list[str]:
     """Names of the draws of blind cases in conf/withheld."""
     return sorted(path.stem for path in (CONF / "withheld").glob("*.yaml"))

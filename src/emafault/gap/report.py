@@ -12,6 +12,7 @@ from ..figures import gap as figures
 from ..figures.page import Page
 from .diagnose import Diagnosis
 from .inference import Problem
+from .retrained import MARKS
 from .which import Family
 from .words import cannot_tell, consequence, effect_words, finding, number
 
@@ -19,7 +20,6 @@ NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
 TABLED = 14  # parameters in the table
 HARDLY = 1.0  # of the prior's width: smallest visible size from which an effect would hardly have shown
-RETRAINED = ("<!-- retrained -->", "<!-- /retrained -->")
 
 
 def write_report(
@@ -64,7 +64,7 @@ def write_report(
     _how_far(page, diagnosis)
     if verdict["fault_vector"]:
         _faults(page, verdict, truths or {}, labels or {})
-    page.parts.append(f"{RETRAINED[0]}{retrained}{RETRAINED[1]}")
+    page.parts.append(f"{MARKS[0]}{retrained}{MARKS[1]}")
     _next(page, verdict)
     if sizes:
         page.heading("What would have shown")

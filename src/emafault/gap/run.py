@@ -159,9 +159,14 @@ def diagnose_recordings(
     verdict["next_experiment"] = next_experiments(found, actuator_experiments)
     named = verdict["verdict"] in ("explained", "group", "partly")
     best = found.found.candidates[0] if named else None
-    values = best.point.values if best is not None else found.found.null.values
-    effects = actuator_experiments.catalogue_effects(twin, values, best.effects if best is not None else ())
-    text = experiment_text(verdict, effects, f"diagnosed_{_file_name(bench.name)}")
+    null = found.found.null
+    verdict["simulator"] = {"before": actuator_experiments.catalogue_effects(twin, null.values, ())}
+    verdict["simulator"]["after"] = (
+        actuator_experiments.catalogue_effects(twin, best.point.values, best.effects)
+        if best is not None
+        else verdict["simulator"]["before"]
+    )
+    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{_file_name(bench.name)}")
     return Diagnosed(found, truths, worst_region(found), text, {n: _label(n, r) for n, r in recordings.items()})
 
 

@@ -1,0 +1,68 @@
+# Where a bench and the simulator disagree, which effect causes it, how far it explains it; networks retrained with it.
+#
+#   snakemake --cores all diagnose --config bench=PATH                 a bench of the reference actuator
+#   snakemake --cores all diagnose --config bench=PATH twin=NAME       a measured machine
+#   snakemake --cores all retrain --config bench=PATH                  what the named effect does for the network
+BENCH = str(config.get("bench", "")).rstrip("/")
+DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
+
+
+def bench_files(wildcards):
+    """The files of the bench."""
+    try:
+        return configuration.bench_files(BENCH)
+    except InputError as error:
+        raise WorkflowError(str(error))
+
+
+rule diagnose_gap:
+    input:
+        files=bench_files,
+        compiled=rules.compile_simulation.output,
+    output:
+        verdict=f"{DIAGNOSIS}/diagnosis.json",
+        report=f"{DIAGNOSIS}/report.html",
+    log:
+        f"{RESULTS}/logs/diagnoses/{configuration.bench_name(BENCH)}/diagnose_gap.log",
+    threads: 2
+    resources:
+        mem_mb=2000,
+        runtime=10,
+        tracking=1,
+    params:
+        bench=BENCH,
+        twin=str(config.get("twin", "actuator")),
+        spec=configuration.diagnosis_spec(PLAN.cases[0].config),
+        code=code("diagnose_gap"),
+    script:
+        "../scripts/diagnose_gap.py"
+
+
+rule retrain_network:
+    input:
+        verdict=rules.diagnose_gap.output.verdict,
+    output:
+        f"{DIAGNOSIS}/retrained.json",
+    log:
+        f"{RESULTS}/logs/diagnoses/{configuration.bench_name(BENCH)}/retrain_network.log",
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        bench=BENCH,
+        spec=configuration.retraining_spec(PLAN.cases[0].config),
+        code=code("retrain_network"),
+    script:
+        "../scripts/retrain_network.py"
+
+
+rule diagnose:
+    """Diagnose a bench."""
+    input:
+        rules.diagnose_gap.output,
+
+
+rule retrain:
+    """Retrain with what the diagnosis of a bench named, and show in its report what that brought."""
+    input:
+        rules.retrain_network.output,
