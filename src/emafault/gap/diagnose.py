@@ -10,11 +10,10 @@ import numpy as np
 from .decide import Calibration, Decision, decide, held_out_features, is_named
 from .how_far import Ladder, climb, closed
 from .inference import Candidate, Point, Problem
-from .twin import Twin
+from .twin import INTERVAL, Twin
 from .where import equation_of, where
 from .which import Search, confusability, far_outside, search
 
-INTERVAL = 1.645  # standard deviations of a 90 % interval
 CONFUSED = 0.9  # cosine of two signatures from which the report calls them hard to tell apart
 
 

@@ -387,17 +387,7 @@ class Problem:
         for round_ in range(rounds):
             if own and renew and round_ in (0, 2):
                 jacobian = jacobian.copy()
-                steps, points = [], []
-                for m in own:
-                    step = self.parameters[m].step
-                    if best.values[m] + step > self.high[m]:
-                        step = -step
-                    point = best.values.copy()
-                    point[m] += step
-                    steps.append(step)
-                    points.append(point)
-                differences = (self.predict(np.array(points)) - best.prediction).T / np.array(steps)
-                jacobian[:, len(self.nuisances) :] = differences
+                jacobian[:, len(self.nuisances) :] = self._effect_columns(best, own)
                 best = self.point(best.values, best.prediction, jacobian, free, widened)
             moved = self.solve(best.values, best.prediction, jacobian, free, widened)
             trial = self.point(moved, self.predict(moved)[0], jacobian, free, widened)
@@ -413,6 +403,34 @@ class Problem:
         return replace(
             candidate, point=best, gain=best.log_evidence - null.log_evidence, refined=True, signature=signature
         )
+
+    def polish(self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis]) -> Candidate:
+        """The candidate fitted to the end with all derivatives taken at its own fit; what is reported comes from here."""
+        chosen = [hypotheses[e] for e in candidate.effects]
+        own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
+        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        point = candidate.point
+        base = self.nuisance_jacobian(point.values, point.prediction, self.nuisances)
+        columns = self._effect_columns(point, own)
+        jacobian = np.concatenate([base, columns], axis=1)
+        start = self.point(point.values, point.prediction, jacobian, point.free, widened)
+        best = self.descend(start, widened)
+        return replace(candidate, point=best, gain=best.log_evidence - null.log_evidence, signature=columns)
+
+    def _effect_columns(self, at: Point, own: Sequence[int]) -> np.ndarray:
+        """(statistic, own) differences by the parameters of effects, simulated at a fit."""
+        if not own:
+            return np.zeros((len(self.cells), 0))
+        steps, points = [], []
+        for m in own:
+            step = self.parameters[m].step
+            if at.values[m] + step > self.high[m]:
+                step = -step
+            point = at.values.copy()
+            point[m] += step
+            steps.append(step)
+            points.append(point)
+        return (self.predict(np.array(points)) - at.prediction).T / np.array(steps)
 
     def projected(self, null: Point, columns: np.ndarray) -> np.ndarray:
         """(I + J S J')^-1 x for whitened columns x: what of them the nuisances cannot take up."""

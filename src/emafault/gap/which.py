@@ -130,6 +130,8 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             null, tried = again, {k: replace(c, gain=c.gain - better) for k, c in tried.items()}
     # an effect more must be worth it: ``addition`` is the prior odds against each further member of a set
     candidates = sorted(tried.values(), key=lambda c: addition * (len(c.effects) - 1) - c.gain)
+    if candidates and candidates[0].gain > HOPELESS:
+        candidates[0] = problem.polish(null, candidates[0], by_id)
     prediction = candidates[0].point.prediction if candidates else null.prediction
     after = families(problem, prediction)
     return Search(null, candidates, singles, after, families(problem, null.prediction))

@@ -119,7 +119,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         if not truth or distance >= 25.0:
             gap_rows.append([1.0, gain, excess])
             gap_truth.append(bool(truth))
-        if not e["candidates"] or (truth and distance < 25.0):
+        if not e["candidates"] or not truth or distance < 25.0:
             continue
         best = set(e["candidates"][0][0])
         right = best == truth and not key["case"]["left_out"]

@@ -12,7 +12,7 @@ from ..actuator.parameters import ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
-from ..gap.twin import Cell, Hypothesis, Parameter
+from ..gap.twin import INTERVAL, Cell, Hypothesis, Parameter
 from ..recording import Recording
 from .actuator_noise import CHANNELS, channel_spread, noise_covariance
 from .actuator_statistics import _COMMUTATION, _SPEED, LATTICE, SIZE, Computed, Nominal, cells_of, compute
@@ -466,7 +466,7 @@ class ActuatorTwin:
         self, effect: str, values: Mapping[str, float], deviations: Mapping[str, float]
     ) -> dict[str, tuple[float, float, float, str]]:
         """Catalogue parameters of an effect from those it was fitted in: name -> (value, low, high, units), 90 %."""
-        z = 1.645
+        z = INTERVAL
         out: dict[str, tuple[float, float, float, str]] = {}
         own = {n.split(".", 1)[1]: (v, deviations[n]) for n, v in values.items()}
         if effect == "dynamic_eccentricity":
