@@ -12,7 +12,7 @@ def bench_files(wildcards):
     try:
         return configuration.bench_files(BENCH)
     except InputError as error:
-        raise WorkflowError(str(error))
+        sys.exit(f"emafault: {error}")
 
 
 rule diagnose_gap:

@@ -28,7 +28,7 @@ CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
 LOST = 2 * np.pi / 3  # from here on a sample cannot be told its sector
 SAME_CONDITION = 2.0  # K
-TEMPERATURES = (-100.0, 250.0)  # degC that an actuator may be soaked at
+TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
 
 
 @dataclass(frozen=True)
