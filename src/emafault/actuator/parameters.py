@@ -6,6 +6,7 @@ fields by name. The field of parameter ``a`` of effect ``stribeck`` is ``stribec
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +65,7 @@ def make_runs(
     actuator: ActuatorParameters,
     faults: np.ndarray,
     *,
-    effects: Mapping[str, Mapping[str, float]] | None = None,
+    effects: Mapping[str, Mapping[str, Any]] | None = None,
     eccentricity_law: str = "stator_fixed",
     dT_magnet: np.ndarray | float | None = None,
     theta_0: np.ndarray | float = 0.0,
@@ -104,7 +105,7 @@ def make_runs(
     return runs
 
 
-def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, float]]) -> None:
+def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, Any]]) -> None:
     """Write effect parameters into existing records, in place.
 
     Raises

@@ -1,6 +1,7 @@
 """From evidence to probabilities and a verdict, with coefficients calibrated on blind cases and then frozen.
 
-Two logistic curves turn what a search has found into probabilities: that there is a gap at all, and, if so, that the best set
+Two logistic curves turn what a search has found into probabilities: that there is a gap at all, and, if so, that the
+best set
 is its cause and not the least bad of a library that lacks the cause. Their coefficients live in a calibration file.
 """
 
@@ -8,6 +9,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +41,8 @@ class Calibration:
         """
         try:
             raw = json.loads(path.read_text())
-            return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in raw.items()})
+            values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in raw.items()}
+            return cls(**values)
         except (OSError, ValueError, TypeError) as error:
             raise InputError(f"{path}: not a calibration file ({error})") from error
 

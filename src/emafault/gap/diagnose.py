@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -87,8 +88,8 @@ def diagnose(
         "candidates": [[list(c.effects), round(c.gain, 2)] for c in found.candidates[:6]],
     }
     mixture = _mixture(problem, found, decision, best)
-    before_faults = fault_vectors(problem, found.null, ladder and (ladder.problem, ladder.recalibrated.values))
-    after_faults = fault_vectors(problem, after, ladder and (ladder.problem, ladder.after.values), mixture)
+    before_faults = fault_vectors(problem, found.null, (ladder.problem, ladder.recalibrated.values) if ladder else None)
+    after_faults = fault_vectors(problem, after, (ladder.problem, ladder.after.values) if ladder else None, mixture)
     verdict["fault_vector"] = {
         name: {"before": before_faults[name], "after": after_faults[name]} for name in before_faults
     }
@@ -106,7 +107,7 @@ def diagnose(
 
 def _which(twin: Twin, problem: Problem, found: Search, decision: Decision, by_id: Mapping) -> list[dict]:
     """The entries of ``which``: sets with their parameters, the empty set, unknown."""
-    entries = []
+    entries: list[dict[str, Any]] = []
     group_id = "group 1" if len(decision.group) > 1 else None
     inside = {c.effects for c in decision.group}
     for candidate, probability in decision.sets:
@@ -122,7 +123,7 @@ def _which(twin: Twin, problem: Problem, found: Search, decision: Decision, by_i
         )
     entries.append({"effects": [], "probability": round(decision.empty, 5), "group": None})
     families = found.null_families
-    unknown = {"effects": ["unknown"], "equation": equation_of(families) if families else "electrical"}
+    unknown: dict[str, Any] = {"effects": ["unknown"], "equation": equation_of(families) if families else "electrical"}
     entries.append(unknown | {"probability": round(decision.unknown, 5), "group": None})
     total = sum(e["probability"] for e in entries)
     for e in entries:
@@ -135,7 +136,7 @@ def _which(twin: Twin, problem: Problem, found: Search, decision: Decision, by_i
 
 
 def _parameters(twin: Twin, problem: Problem, candidate: Candidate, by_id: Mapping) -> dict:
-    """Fitted parameters of a set with 90 % intervals; names are the catalogue's, prefixed where two effects share one."""
+    """Fitted parameters of a set with 90 % intervals, prefixed by the effect where two share a name."""
     point = candidate.point
     deviation = {m: float(np.sqrt(point.covariance[c, c])) for c, m in enumerate(point.free)}
     out: dict[str, dict] = {}
@@ -188,7 +189,7 @@ def fault_vectors(
     confirm: tuple[Problem, np.ndarray] | None,
     mixture: Sequence[tuple[Point, float]] = (),
 ) -> dict[str, dict]:
-    """Recording -> fault component -> value with 90 % interval, from a fit and, widened, from what else is believable."""
+    """Recording -> fault component -> value with 90 % interval, widened by what else is believable."""
     deviation = {m: float(np.sqrt(point.covariance[c, c])) for c, m in enumerate(point.free)}
     spread = {m: 0.0 for m in deviation}
     for m in spread:
@@ -220,7 +221,7 @@ def fault_vectors(
 
 
 def biased(before: Mapping[str, dict], after: Mapping[str, dict]) -> dict[str, float]:
-    """Component -> estimate before less estimate after, mean over the recordings; those beyond the interval's half width."""
+    """Component -> mean estimate before less after, where it is more than a quarter of the interval."""
     out = {}
     for component in {c for f in before.values() for c in f}:
         shifts = [f[component]["value"] - after[n][component]["value"] for n, f in before.items() if component in f]

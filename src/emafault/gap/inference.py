@@ -108,9 +108,10 @@ class Problem:
     def nuisance_jacobian(self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int]) -> np.ndarray:
         """(statistic, free) forward differences; parameters of disjoint recordings are moved together.
 
-        A twin may know some derivatives exactly from others: ``derived`` names them and ``derive(name, values, derivative,
-        recording)`` gives the rows of one recording from a function that returns those of another parameter. What cancels
-        exactly in truth then cancels here too, where noisy differences would feign information.
+        A twin may know some derivatives exactly from others: ``derived`` names them and ``derive(name, values,
+        derivative,
+        recording)`` gives the rows of one recording from a function that returns those of another parameter. What
+        cancels exactly in truth then cancels here too, where noisy differences would feign information.
         """
         derived = set(getattr(self.twin, "derived", ()))
         known = [m for m in free if self.parameters[m].name in derived]
@@ -316,7 +317,8 @@ class Problem:
 
     def screen(self, null: Point, hypotheses: Sequence[Hypothesis]) -> list[Candidate]:
         """Linearised fit of every hypothesis at every start, from signatures simulated at the null fit."""
-        points, plan = [], []
+        points: list[np.ndarray] = []
+        plan = []
         for h in hypotheses:
             own = self.effect_parameters(h)
             for start in h.starts:
@@ -345,16 +347,16 @@ class Problem:
                 gain = fitted.log_evidence - null.log_evidence
                 columns = null.jacobian[:, [free.index(m) for m in own]]
                 out.append(Candidate((h.effect,), fitted, gain, False, null.values, columns))
-        for h, own, start, first, partial in plan:
+        for h, own, begin_at, first, partial in plan:
             full = predictions[first]
             columns = np.zeros((len(self.cells), len(own)))
             off = np.array([self.parameters[m].off for m in own])
             if len(own) == 1:
-                columns[:, 0] = (full - null.prediction) / (start[0] - off[0])
+                columns[:, 0] = (full - null.prediction) / (begin_at[0] - off[0])
             for c, at in partial:
-                columns[:, c] = (full - predictions[at]) / (start[c] - off[c])
+                columns[:, c] = (full - predictions[at]) / (begin_at[c] - off[c])
             begin = null.values.copy()
-            begin[own] = start
+            begin[own] = begin_at
             out.append(self.linear(null, (h,), begin, full, columns))
         return out
 
@@ -405,7 +407,7 @@ class Problem:
         )
 
     def polish(self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis]) -> Candidate:
-        """The candidate fitted to the end with all derivatives taken at its own fit; what is reported comes from here."""
+        """The candidate fitted to the end, all derivatives taken at its own fit; what is reported comes from here."""
         chosen = [hypotheses[e] for e in candidate.effects]
         own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]

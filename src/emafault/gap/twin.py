@@ -1,6 +1,7 @@
 """What the machine-independent diagnosis needs to know of a machine.
 
-A *twin* turns recordings into a vector of statistics and predicts that vector from parameters. The same code computes the
+A *twin* turns recordings into a vector of statistics and predicts that vector from parameters. The same code computes
+the
 statistics of measured and of simulated recordings. Everything else (where, which, how far, groups, unknown) is done by
 the core from these alone.
 """
@@ -31,10 +32,12 @@ class Cell:
 class Parameter:
     """One parameter of the twin's model, with its prior.
 
-    Nuisances (``effect`` None) have the Gaussian prior (``mean``, ``sd``) and are always free. The parameters of an effect
-    are off at ``off`` and free, with the prior (``mean``, ``sd``) and the hard bounds (``low``, ``high``), only in hypotheses
-    that contain the effect. A nuisance may also be the subject of a calibration hypothesis, which widens its prior to the
-    bounds. ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all.
+    Nuisances (``effect`` None) have the Gaussian prior (``mean``, ``sd``) and are always free. The parameters of an
+    effect
+    are off at ``off`` and free, with the prior (``mean``, ``sd``) and the hard bounds (``low``, ``high``), only in
+    hypotheses
+    that contain the effect. A nuisance may also be the subject of a calibration hypothesis, which widens its prior to
+    the bounds. ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all.
     """
 
     name: str
@@ -64,13 +67,22 @@ class Hypothesis:
 class Twin(Protocol):
     """A machine as the diagnosis sees it. ``part`` is a sequence of recording names.
 
-    A twin may also offer ``report(effect, values, deviations)``, which turns the parameters of an effect as fitted into those
+    A twin may also offer ``report(effect, values, deviations)``, which turns the parameters of an effect as fitted
+    into those
     of the catalogue: name -> (value, low, high, units); and ``experiments(values)``, the menu of next experiments.
     """
 
-    name: str
-    parameters: Sequence[Parameter]
-    hypotheses: Sequence[Hypothesis]
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+
+    @property
+    def parameters(self) -> Sequence[Parameter]:
+        """Nuisances and effects' parameters."""
+
+    @property
+    def hypotheses(self) -> Sequence[Hypothesis]:
+        """The library."""
 
     def cells(self, part: Sequence[str]) -> list[Cell]:
         """One cell per statistic of these recordings, in the order of the statistics, recording by recording."""

@@ -1,4 +1,4 @@
-"""Which effect: evidence of the empty set, every effect, pairs and triples by beam; goodness of fit; groups; unknown."""
+"""Which effect: evidence of the empty set, of every effect, of pairs and triples by beam; goodness of fit; groups."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -64,7 +64,7 @@ def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
 
 
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
-    """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence that one more effect must bring."""
+    """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence one more effect must bring."""
     null = problem.fit_null()
     by_id = {h.effect: h for h in hypotheses}
     screened = problem.screen(null, hypotheses)
@@ -112,10 +112,10 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         grown = _grow(problem, null, beam, singles, by_id, addition)
         if not grown:
             break
-        before = {k: v.gain for k, v in tried.items()}
+        known = set(tried)
         for candidate in grown:
             accept(problem.refine(null, candidate, by_id, 3))
-        new = [c for k, c in tried.items() if k not in before]
+        new = [c for k, c in tried.items() if k not in known]
         if not new:
             break
         top = max(new, key=lambda c: c.gain)
@@ -204,7 +204,7 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
 
 
 def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """The first candidate with those that these data cannot tell from it, then the same for the others of equal size."""
+    """The first candidate together with those that these data cannot tell from it."""
     if not candidates:
         return []
     first = candidates[0]

@@ -122,6 +122,8 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         if not e["candidates"] or not truth or distance < 25.0:
             continue
         best = set(e["candidates"][0][0])
+        if key["case"]["left_out"] and _twins(best, truth):
+            continue  # no recording of one direction tells them apart: nothing to learn from
         right = best == truth and not key["case"]["left_out"]
         held = e["held_out"] or [0.0, 0.0]
         unexplained = np.log10(max(e["unexplained"], 1e-5))
@@ -135,7 +137,12 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
     return Calibration(tuple(gap), tuple(both[:size]), tuple(both[size:]), start.addition, start.remainder, source)
 
 
-def _logistic(rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, width: float = 2.0) -> list[float]:
+def _twins(one: set[str], other: set[str]) -> bool:
+    """Whether two sets are the pair of effects that are one and the same in motion of a single direction."""
+    return one | other == {"load_constant", "friction_asymmetry"}
+
+
+def _logistic(rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, width: float = 1.0) -> list[float]:
     """Coefficients (feature,) by maximum a posteriori about ``centre``."""
     sign = np.where(truth, 1.0, -1.0)
 

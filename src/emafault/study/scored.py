@@ -29,7 +29,11 @@ def score_draw(batches: Sequence[Path], report: Path, scores: Path, where: str) 
     place = json.loads(Path(where).read_text())
     metrics = {m["id"]: float(m["value"]) for m in found["metrics"] if m["value"] is not None}
     draw = report.parent.name
+    files: dict[str, str | Path] = {str(report): "", str(scores): ""}
     entry = Entry(
-        f"withheld {draw}", {"draw": draw, "cases": len(found["rows"])}, metrics, files={report: "", scores: ""}
+        f"withheld {draw}",
+        {"draw": draw, "cases": len(found["rows"])},
+        metrics,
+        files=files,
     )
     log_run(place["uri"], place["experiment"], entry)

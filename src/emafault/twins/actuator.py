@@ -135,11 +135,11 @@ class ActuatorTwin:
     # ---- parameters and hypotheses
     def _parameters(self) -> list[Parameter]:
         out = []
-        for (effect, name), p in _TOLERANCES.items():
+        for (id_, name), p in _TOLERANCES.items():
             centre = getattr(self.actuator, p.follows) if p.follows else p.nominal
             sd = p.tolerance * centre
             low, high = min(p.low, centre - 6 * sd), max(p.high, centre + 6 * sd)
-            out.append(Parameter(f"{effect}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd))
+            out.append(Parameter(f"{id_}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd))
         groups: dict[str, list[str]] = {}
         for name, b in self._brought.items():
             key = "unknown" if b.recording.health == "unknown" else f"{b.recording.health} {name}"
@@ -326,7 +326,8 @@ class ActuatorTwin:
 
     # ---- noise
     def settle(self, values: np.ndarray, part: Sequence[str]) -> None:
-        """Take start angle, step instants, noise and its bias of the statistics from a comparison with one simulated point.
+        """Take start angle, step instants, noise and its bias of the statistics from a comparison with one simulated
+        point.
 
         The sensors of a bench are the same in all its recordings, so the noise of a channel is the median over them.
         """

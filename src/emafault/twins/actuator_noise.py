@@ -1,7 +1,7 @@
 """Noise of a recording's channels, and the covariance it gives the statistics.
 
-A statistic is a weighted sum of residuals and a residual a weighted sum of recorded values, so the weight of every recorded
-value in every statistic is known, and the covariance follows from the channels' variances.
+A statistic is a weighted sum of residuals and a residual a weighted sum of recorded values, so the weight of every
+recorded value in every statistic is known, and the covariance follows from the channels' variances.
 """
 
 import numpy as np
@@ -48,8 +48,8 @@ def third_difference_deviation(values: np.ndarray) -> float:
 def channel_spread(signals: dict, nominal: Nominal) -> dict[str, float]:
     """Spread of each channel at the sample scale (SI): noise and whatever the machine itself does that fast.
 
-    Currents and voltages are taken where a phase floats and the rotor turns, for there the current is zero and the voltage
-    smooth; a recording without such samples leaves these channels out.
+    Currents and voltages are taken where a phase floats and the rotor turns, for there the current is zero and the
+    voltage smooth; a recording without such samples leaves these channels out.
     """
     p, theta = nominal.constants[3], signals["rotor_angle"]
     middle = 0.5 * (theta[1:] + theta[:-1])

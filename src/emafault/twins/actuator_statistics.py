@@ -1,11 +1,14 @@
 """Statistics of a recording of the actuator: its signals put into the nominal model's equations.
 
-Every statistic is a matched filter ``sum phi r / sqrt(sum phi^2)`` of one equation's residual r with one regressor phi, so
-that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The same code
+Every statistic is a matched filter ``sum phi r / sqrt(sum phi^2)`` of one equation's residual r with one regressor
+phi, so
+that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The same
+code
 runs on measured and on simulated recordings. Residuals use the nominal parameters at the measured ambient temperature.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -86,7 +89,7 @@ def _specification() -> list[tuple[str, str, str, float, float]]:
     for direction, low, high in (("forward", 0.0, 1.0), ("backward", -1.0, 0.0)):
         for label in ("constant", "speed", "acceleration"):
             out.append((f"{direction} {label}", "torque", "direction", low, high))
-        for low, high in zip(SPEED_EDGES[:-1], SPEED_EDGES[1:], strict=True):
+        for low, high in pairwise(SPEED_EDGES):
             signed = (low, high) if direction == "forward" else (-high, -low)
             out.append((f"{direction} speed bin", "torque", "rotor_speed", *signed))
     for label, along in (("position", "rotor_angle"), ("drive", "current"), ("time", "time")):
@@ -142,7 +145,7 @@ def cells_of(recording: str) -> list[Cell]:
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the equations need of the nominal actuator and of one recording; theta_0 (rad) is the rotor's start angle."""
+    """What the equations need of the nominal actuator and of one recording."""
 
     constants: np.ndarray
     interval: float
@@ -154,9 +157,11 @@ class Nominal:
         heat = 1.0 + actuator.copper_coefficient * (recording.ambient_temperature - actuator.reference_temperature)
         a = actuator
         constants = np.array(
-            [a.resistance * heat, a.inductance, a.back_emf, a.pole_pairs, a.inertia, a.viscous_friction]
-            + [a.coulomb_friction, a.gear_ratio, theta_0, a.bus_voltage, a.position_gain, a.speed_gain]
-            + [a.speed_integral_gain, a.current_limit, a.speed_limit]
+            [
+                *(a.resistance * heat, a.inductance, a.back_emf, a.pole_pairs, a.inertia, a.viscous_friction),
+                *(a.coulomb_friction, a.gear_ratio, theta_0, a.bus_voltage, a.position_gain, a.speed_gain),
+                *(a.speed_integral_gain, a.current_limit, a.speed_limit),
+            ]
         )
         has_end, has_bus = recording.phase_current_end is not None, recording.bus_voltage is not None
         return cls(constants, recording.interval, has_end, has_bus)
@@ -458,7 +463,7 @@ def fill_statistics(
 
 @dataclass(frozen=True)
 class Computed:
-    """Statistics (statistic,), how many samples each has seen, residuals (equation, time), regressors (statistic, time)."""
+    """Statistics, norms and counts (statistic,), residuals (equation, time), regressors (statistic, time)."""
 
     values: np.ndarray
     norm: np.ndarray
