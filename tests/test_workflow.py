@@ -203,3 +203,14 @@ def test_results_that_cannot_be_written_are_refused(house, tmp_path):
     said = [line for line in run.stderr.splitlines() if line.startswith("emafault:")]
     assert run.returncode != 0 and len(said) == 1 and "results: is not a folder" in said[0]
     assert (tmp_path / "house" / "results").read_text() == "a file"
+
+
+def test_the_withheld_check_makes_diagnoses_and_scores_blind_cases(house):
+    run = _snakemake(house, "withheld_smallest", *SMOKE)
+    assert run.returncode == 0, run.stderr[-2000:]
+    folder = house / "results" / "withheld" / "smallest"
+    scores = json.loads((folder / "scores.json").read_text())
+    assert len(scores["rows"]) == 3 and scores["missing"] == []
+    assert (folder / "scoreboard.html").stat().st_size > 10_000
+    # the recordings are gone once diagnosed, and the keys never stood beside them
+    assert not list(folder.rglob("recording_*.nc"))
