@@ -23,8 +23,8 @@ class Rival:
     rms: float
 
 
-def held_out(diagnosis: Diagnosis) -> dict:
-    """Outcome of the named set on the confirm recordings, beside every other set that was fitted.
+def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
+    """Outcome of the named set on the confirm recordings, beside the other sets that were fitted (``most`` in all).
 
     Returns
     -------
@@ -35,7 +35,7 @@ def held_out(diagnosis: Diagnosis) -> dict:
     ``rivals``: effects, gain in log evidence on the explore recordings and root mean square on these, best first.
     """
     ladder, decision = diagnosis.ladder, diagnosis.decision
-    candidates = diagnosis.found.candidates[:RIVALS]
+    candidates = diagnosis.found.candidates[:most]
     if ladder is None or not candidates:
         return {"outcome": "no claim", "claimed": [], "rivals": []}
     problem = ladder.problem

@@ -15,11 +15,11 @@ from .diagnose import Diagnosis
 from .inference import Candidate, Point, Problem
 from .twin import Twin
 
-SHORTLIST = 4
+SHORTLIST = 3
 PROPOSED = 3
 LARGEST_ODDS = 1e6
 SOAK_VARIANCE_FLOOR = 1e-12
-HIDDEN = 5  # effects that a clear verdict's next recording should show, those that the bench shows least
+HIDDEN = 4  # effects that a clear verdict's next recording should show, those that the bench shows least
 SHOWN = 25.0  # squared distance from which an effect is shown
 LIKELY = 0.02  # probability below which a reading is no rival
 

@@ -19,6 +19,7 @@ from .words import cannot_tell, consequence, effect_words, finding, number
 NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
 TABLED = 14  # parameters in the table
+WEAK_ODDS = 3.0  # below this a recording does not tell two readings apart
 HARDLY = 1.0  # of the prior's width: smallest visible size from which an effect would hardly have shown
 
 
@@ -328,6 +329,8 @@ def _next(page: Page, verdict: Mapping[str, Any]) -> None:
                 "" if odds is None else ("over 10⁶" if odds >= 999_999 else f"{odds:.3g}"),
             ]
         )
+    if all((e.get("expected_odds") or 1.0) < WEAK_ODDS for e in entries):
+        page.paragraph("None of the recordings that could be made would tell these readings apart; the best are:")
     page.table(["command", "soak", "would tell", "expected odds"], rows)
 
 

@@ -22,6 +22,7 @@ from .words import summary
 
 VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
 THREADS = 2
+RIVALS = 5  # sets that are put on the confirm recordings
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def diagnose_recordings(
     verdict["warnings"] = bench.warnings
     if not whole:
         return Diagnosed(found, truths)
-    verdict["held_out"] = held_out(found)
+    verdict["held_out"] = held_out(found, RIVALS)
     verdict["shrinks"]["features"] = feature_ladder(found)
     verdict["next_experiment"] = next_experiments(found, actuator_experiments)
     named = verdict["verdict"] in ("explained", "group", "partly")

@@ -17,14 +17,12 @@ AMBIENTS = (-40.0, 20.0, 80.0)  # degC
 INTERVAL = 2e-4  # s
 #: command, its settings, length (s)
 _COMMANDS: tuple[tuple[str, Mapping[str, float], float], ...] = (
-    ("parabolic", {"acceleration": 0.3}, 1.0),
-    ("parabolic", {"acceleration": -0.9}, 1.0),
+    ("parabolic", {"acceleration": 0.6}, 0.6),
     ("ramp", {"speed": 0.03}, 1.0),
-    ("ramp", {"speed": -0.4}, 1.0),
-    ("reversal", {"amplitude": 0.02, "speed": 0.1}, 1.0),
-    ("reversal", {"amplitude": 0.06, "speed": 0.4}, 1.0),
-    ("sine", {"amplitude": 0.04, "frequency": 2.0}, 1.0),
-    ("chirp", {"amplitude": 0.01, "frequency_start": 1.0, "frequency_end": 10.0}, 1.0),
+    ("ramp", {"speed": -0.4}, 0.6),
+    ("reversal", {"amplitude": 0.01, "speed": 0.1}, 0.6),
+    ("sine", {"amplitude": 0.04, "frequency": 2.0}, 0.6),
+    ("chirp", {"amplitude": 0.01, "frequency_start": 1.0, "frequency_end": 12.0}, 0.6),
     ("reversal", {"amplitude": 0.1, "speed": 0.4}, 3.0),
 )
 _UNITS = {"acceleration": "rad/s2", "speed": "rad/s", "amplitude": "rad", "time": "s"}
