@@ -12,7 +12,7 @@ from . import style
 BEFORE, AFTER, MEASURED, FLOOR = "#c8553d", "#2a9d8f", "#22262b", "#8a8a8a"
 #: from nothing to see, through visible, to strong; z below 3 stays nearly white
 _MAP = LinearSegmentedColormap.from_list("z", ["#f7f7f5", "#f3e3c3", "#e8a15b", "#c8553d", "#6d1f2f"])
-_WORDS = {"rotor_angle": "rotor angle", "rotor_speed": "rotor speed"}
+_WORDS = {"rotor_angle": "rotor angle", "rotor_speed": "rotor speed (rad/s)", "order": "order of the turn"}
 
 
 def draw_map(
@@ -125,7 +125,7 @@ def draw_ranking(entries: Sequence[Mapping[str, Any]]) -> plt.Figure:
             right.barh(m, entry["gain"], color=colour, height=0.66)
             side = "left" if entry["gain"] >= 0 else "right"
             right.annotate(
-                f"{entry['gain']:.4g}", (entry["gain"], m), xytext=(4 if side == "left" else -4, 0),
+                f"{entry['gain']:,.1f}" if abs(entry["gain"]) < 1e3 else f"{entry['gain']:,.0f}", (entry["gain"], m), xytext=(4 if side == "left" else -4, 0),
                 textcoords="offset points", va="center", ha=side, fontsize=8.5,
             )  # fmt: skip
     grouped = [m for m, entry in enumerate(entries) if entry["group"]]
