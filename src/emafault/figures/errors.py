@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..faults import FAULT_NAMES
-from .style import GREY, LABELS, colour, named, plt
+from .style import GREY, LABELS, colour, named, plt, readable_log
 
 
 def error_boxes(errors: Mapping[tuple[str, str], np.ndarray], bound: Mapping[str, float] | None):
@@ -89,6 +89,7 @@ def variants(names: Sequence[str], tables: Mapping[str, Mapping[str, Sequence[fl
                 shift = 0.12 * (number - 0.5 * len(lines))
                 axes.plot(values, places - shift, marker, color=colour(method), ms=6, alpha=0.85, label=label)
         axes.set_xscale("log")
+        readable_log(axes.xaxis)
         axes.set_title(f"mean absolute error of {output}", loc="left", fontsize=10)
         axes.set_yticks(places, [name.replace("_", " ") for name in names])
     handles, labels = grid[0, 0].get_legend_handles_labels()

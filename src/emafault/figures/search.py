@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
-from .style import GREY, PHASE_COLOURS, colour, plt
+from .style import GREY, PHASE_COLOURS, colour, plt, readable_log
 
 
 def learning_curves(histories: Mapping[str, Sequence[Sequence[Mapping[str, Any]]]]):
@@ -71,8 +70,6 @@ def search_and_front(trials: Sequence[Mapping[str, Any]], chosen: int):
     )
     right.plot(size[mine], error[mine], "*", ms=14, color=PHASE_COLOURS[0], label="chosen")
     right.set(xlabel="number of parameters", ylabel="held-out error over range", xscale="log", yscale="log")
-    right.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    right.xaxis.set_major_formatter(ScalarFormatter())
-    right.xaxis.set_minor_formatter(NullFormatter())
+    readable_log(right.xaxis)
     right.legend()
     return figure

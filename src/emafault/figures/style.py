@@ -5,6 +5,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 #: one colour a reconstruction; others take the remaining ones in turn
 COLOURS = {"paper": "#b5651d", "weighted": "#4c78a8", "weighted_floating": "#2a9d8f", "angle_resolved": "#7b5ea7"}
@@ -25,6 +26,14 @@ plt.rcParams.update(
         "legend.frameon": False,
     }
 )
+
+
+def readable_log(axis) -> None:
+    """Plain numbers at 1, 2 and 5 of each decade of a logarithmic axis, or at 1 where it spans many."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60.0 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def colour(method: str) -> str:
