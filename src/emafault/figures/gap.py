@@ -124,8 +124,9 @@ def draw_ranking(entries: Sequence[Mapping[str, Any]]) -> plt.Figure:
         else:
             right.barh(m, entry["gain"], color=colour, height=0.66)
             side = "left" if entry["gain"] >= 0 else "right"
+            digits = 0 if abs(entry["gain"]) > 1e3 else 1
             right.annotate(
-                f"{entry['gain']:,.{0 if abs(entry['gain']) > 1e3 else 1}f}", (entry["gain"], m), xytext=(4 if side == "left" else -4, 0),
+                f"{entry['gain']:,.{digits}f}", (entry["gain"], m), xytext=(4 if side == "left" else -4, 0),
                 textcoords="offset points", va="center", ha=side, fontsize=8.5,
             )  # fmt: skip
     grouped = [m for m, entry in enumerate(entries) if entry["group"]]

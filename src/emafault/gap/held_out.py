@@ -10,6 +10,7 @@ from .how_far import own_nuisances, refit
 
 RIVALS = 12
 VISIBLE = 1.3  # root mean square from which a misfit on the confirm recordings is more than their noise
+CLEAR_DROP = 25.0  # of chi-square: a set that takes away more has been seen to help, however small the misfit
 WORSE = 0.95  # of the recalibrated residual: a named set that leaves more than this has not helped
 BETTER = 0.7  # of the named set's residual: a rival that leaves less than this is preferred
 
@@ -49,7 +50,7 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     claimed: Sequence[str] = ()
     if not named:
         outcome = "no claim"
-    elif before < visible and best.rms < visible:
+    elif before < visible and best.rms < visible and before**2 - best.rms**2 < CLEAR_DROP / len(problem.cells):
         outcome, claimed = "not seen", best.effects
     elif best.rms > VISIBLE and better:
         outcome, claimed = "rival", shared([best.effects, *(r.effects for r in better)])
