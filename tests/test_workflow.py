@@ -26,7 +26,7 @@ def house(tmp_path_factory):
     """A copy of what the workflow needs, without results."""
     folder = tmp_path_factory.mktemp("house")
     ignore = shutil.ignore_patterns("__pycache__", "*.egg-info")
-    for name in ("workflow", "profiles", "conf", "src"):
+    for name in ("workflow", "profiles", "conf", "src", "data"):
         shutil.copytree(ROOT / name, folder / name, ignore=ignore)
     shutil.copy(ROOT / "Snakefile", folder)
     return folder

@@ -31,6 +31,7 @@ rule diagnose_cases:
 rule score_cases:
     input:
         batches=withheld_batches,
+        measured=rules.diagnose_measured.output.withheld,
         where=rules.prepare_tracking.output,
     output:
         report=f"{WITHHELD}/{{draw}}/scoreboard.html",

@@ -7,4 +7,5 @@ from emafault.study.scored import score_draw
 
 with one_line_errors(snakemake.log[0]):
     files = [Path(path) for path in snakemake.input.batches]
-    score_draw(files, Path(snakemake.output.report), Path(snakemake.output.scores), snakemake.input.where[0])
+    given, out = snakemake.input, snakemake.output
+    score_draw(files, Path(given.measured), Path(out.report), Path(out.scores), given.where[0])

@@ -9,12 +9,13 @@ from ..withheld.scoreboard import write_scoreboard
 from ..withheld.scoring import score
 
 
-def score_draw(batches: Sequence[Path], report: Path, scores: Path, where: str) -> None:
+def score_draw(batches: Sequence[Path], measured: Path, report: Path, scores: Path, where: str) -> None:
     """Score the cases of a draw: page, figures and ``scores.json`` beside ``report``, and one MLflow run.
 
     Parameters
     ----------
     batches : what the jobs of the draw have written
+    measured : rows of the check by known changes of measured recordings, the rung T6
     where : what ``prepare_tracking`` has written
 
     Raises
@@ -22,7 +23,7 @@ def score_draw(batches: Sequence[Path], report: Path, scores: Path, where: str) 
     InputError : a verdict that cannot be read, or a tracking server that cannot be used
     """
     folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    found = score(folder)
+    found = score(folder) | {"measured": json.loads(measured.read_text())}
     page = write_scoreboard(found, report.parent)
     if page != report:
         page.replace(report)

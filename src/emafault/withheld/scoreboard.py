@@ -4,7 +4,7 @@ import base64
 import html
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -147,6 +147,22 @@ def _confusion(h: Mapping) -> str:
     return f"<tr><td>{h['truth']}</td><td>{h['said']}</td>{numbers}</tr>"
 
 
+def _measured(rows: Sequence[Mapping]) -> str:
+    """The rung on measured data: known distortions and left-out effects, machine by machine."""
+    if not rows:
+        return ""
+    lines = "".join(
+        f"<tr><td>{html.escape(r['twin'])} {html.escape(r['case'])}</td><td>{html.escape(r['what'])}</td>"
+        f"<td>{r['verdict']}: {html.escape(', '.join(r['named']) or '-')}</td>"
+        f"<td class='{'good' if r['right'] else 'short'}'>{'right' if r['right'] else 'wrong'}</td></tr>"
+        for r in rows
+    )
+    right, literal = sum(bool(r["right"]) for r in rows), sum(bool(r["unknown"]) for r in rows)
+    return f"""<h2>T6: known changes of measured recordings</h2><p>{right} of {len(rows)} right; {literal} with the word
+unknown itself. A left-out effect is right, too, where a remainder or the confirming recordings refuse it in the right
+equation.</p><table><tr><th>machine</th><th>change</th><th>verdict</th><th></th></tr>{lines}</table>"""
+
+
 def _page(scores: Mapping, pictures: Mapping[str, str]) -> str:
     head = "<tr><th>metric</th><th>measured</th><th>90 % interval</th><th>cases</th><th>good</th><th>aim</th></tr>"
     table = "".join(_row(m) for m in scores["metrics"] if m["good"] is not None)
@@ -169,5 +185,6 @@ nominal model, nuisances marginalised, of 25 or more. <span class="aim">Aim met<
 <h2>Closure on held-out recordings</h2>{image["closure"]}
 <h2>Effect by effect</h2><table><tr><th>effect</th><th>T1 right</th><th>T3 called unknown</th><th>T4 right</th></tr>
 {effects}</table>
+{_measured(scores.get("measured") or [])}
 </body></html>
 """
