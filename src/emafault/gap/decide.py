@@ -18,6 +18,8 @@ from .inference import Candidate, Problem
 from .which import Search, far_outside, groups
 
 DEFAULT = Path(__file__).with_name("calibration.json")
+#: the prior of a calibration, and what machines without blind cases of their own are judged by
+UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
 
 
 @dataclass(frozen=True)

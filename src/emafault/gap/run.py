@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..progress import say
 from ..recording import Recording, replace_atomically
 from .bench import Bench, read_bench, split_bench
-from .decide import Calibration
+from .decide import UNCALIBRATED, Calibration
 from .diagnose import Diagnosis, diagnose
 from .words import summary
 
@@ -190,7 +190,7 @@ def diagnose_measured(path: Path, twin: str, exclude: Sequence[str] = ()) -> dic
 
     if exclude:
         raise InputError("--exclude: effects can be left out of the actuator's library only")
-    cases = diagnose_cases(twin, path, Calibration.load())
+    cases = diagnose_cases(twin, path, Calibration.load(UNCALIBRATED))
     for found in cases.values():
         found.verdict.setdefault("warnings", [])
     return {case: Diagnosed(found, {}) for case, found in cases.items()}

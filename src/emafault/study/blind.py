@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..gap.bench import read_bench, split_bench
-from ..gap.decide import Calibration
+from ..gap.decide import UNCALIBRATED, Calibration
 from ..gap.diagnose import diagnose
 from ..recording import replace_atomically
 from ..twins.actuator import ActuatorTwin
@@ -82,7 +82,7 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
 def calibrate_draw(batches: Sequence[Path], output: Path) -> None:
     """Calibrate on the cases of a draw and write the calibration."""
     folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    calibrate(folder, Calibration.load()).save(output)
+    calibrate(folder, Calibration.load(UNCALIBRATED)).save(output)
 
 
 def diagnose_bench(

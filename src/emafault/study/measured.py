@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from ..gap.decide import Calibration
+from ..gap.decide import UNCALIBRATED, Calibration
 from ..gap.diagnose import Diagnosis
 from ..recording import replace_atomically
 from ..twins.diagnosed import Withheld, check_file, diagnose_cases
@@ -25,7 +25,7 @@ def diagnose_file(
     ------
     InputError : a twin, file or case that cannot be used
     """
-    found = diagnose_cases(twin, Path(path), Calibration.load(), nameplate)
+    found = diagnose_cases(twin, Path(path), Calibration.load(UNCALIBRATED), nameplate)
     verdicts = {case: diagnosis.verdict for case, diagnosis in found.items()}
     if len(verdicts) == 1:
         write_json(out / "diagnosis.json", next(iter(verdicts.values())))
@@ -46,7 +46,7 @@ def diagnose_sets(listed: Path, report: Path, figures: Path, verdicts: Path, wit
     """
     folder = Path(listed).parent
     plates = yaml.safe_load((folder / "nameplate.yaml").read_text())
-    calibration = Calibration.load()
+    calibration = Calibration.load(UNCALIBRATED)
     found: dict[str, dict[str, Diagnosis]] = {}
     rows: list[Withheld] = []
     for entry in yaml.safe_load(Path(listed).read_text()):
