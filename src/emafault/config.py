@@ -341,8 +341,9 @@ def withheld_jobs(draw: str) -> list[tuple[str, int]]:
 def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
     """What one job of blind cases reads: its seeds, the actuator and the sensors."""
     read = _withheld_draw(draw)
-    first, size = read["first_seed"] + batch * read["batch"], read["batch"]
-    last = min(first + size, read["first_seed"] + read["cases"][rung])
+    origin = read["first_seed"][rung] if isinstance(read["first_seed"], dict) else read["first_seed"]
+    first = origin + batch * read["batch"]
+    last = min(first + read["batch"], origin + read["cases"][rung])
     config = compose()
     seeds = {"rung": rung, "first": first, "last": last}
     return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
