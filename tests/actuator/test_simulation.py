@@ -1,0 +1,126 @@
+"""The event-driven simulation: check figures, exactness, and physics that can be worked out by hand."""
+
+import numpy as np
+import pytest
+
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.simulate import simulate
+from emafault.config import reference_actuator
+from emafault.effects import EFFECTS
+
+ACTUATOR = reference_actuator()
+HEALTHY = np.zeros((1, 6))
+FAULT = np.array([[0.08, 0.03, 0.0, 0.12, -0.05, 40.0]])
+
+
+def command(name, duration, **settings):
+    return command_positions(name, settings, duration, ACTUATOR.control_period)
+
+
+def parabolic(duration):
+    return command("parabolic", duration, acceleration=0.3)
+
+
+def test_check_figures_of_the_reference():
+    """Speed at t; active current as the mean of the 20 ms before t (at 0.05 s it still rises, to 0.844 A at t itself)."""
+    signals = simulate(make_runs(ACTUATOR, HEALTHY), parabolic(1.0), 1.0, 2e-4)
+    speed = signals["rotor_speed"][0]
+    active = np.abs(signals["phase_current"][0]).sum(1) / 2.0
+    for t, low, high, i_low, i_high in [
+        (0.05, 6.2, 6.5, 0.80, 0.84), (0.10, 13.2, 13.6, 0.855, 0.865), (0.20, 28.1, 28.5, 0.875, 0.895),
+        (0.50, 73.1, 73.5, 0.935, 0.955), (1.00, 147.5, 148.5, 1.035, 1.055),
+    ]:  # fmt: skip
+        n = round(t / 2e-4)
+        assert low <= speed[n - 2 : n + 3].mean() <= high, t
+        assert i_low <= active[n - 100 : n].mean() <= i_high, t
+
+
+@pytest.mark.parametrize("fault", [HEALTHY, FAULT])
+def test_effects_at_nominal_values_change_no_bit(fault):
+    plain = simulate(make_runs(ACTUATOR, fault), parabolic(0.3), 0.3, 2e-4)
+    named = make_runs(ACTUATOR, fault, effects={name: effect.off for name, effect in EFFECTS.items()})
+    for name, values in simulate(named, parabolic(0.3), 0.3, 2e-4).items():
+        assert np.array_equal(values, plain[name]), name
+
+
+def test_threads_and_neighbours_change_no_bit():
+    faults = np.concatenate([HEALTHY, FAULT, 0.5 * FAULT, -0.1 * FAULT + 0.05])
+    runs = make_runs(ACTUATOR, faults)
+    one = simulate(runs, parabolic(0.2), 0.2, 2e-4, threads=1)
+    two = simulate(runs, parabolic(0.2), 0.2, 2e-4, threads=2)
+    alone = simulate(runs[2:3], parabolic(0.2), 0.2, 2e-4)
+    for name, values in one.items():
+        assert np.array_equal(values, two[name]), name
+        assert np.array_equal(values[2:3], alone[name]), name
+
+
+@pytest.mark.parametrize("fault", [HEALTHY, FAULT])
+def test_energy_is_conserved(fault):
+    """Work of the phase voltages = copper loss + magnetic energy + kinetic energy + friction loss."""
+    runs, interval, duration = make_runs(ACTUATOR, fault), 1e-6, 0.15
+    signals = simulate(runs, parabolic(duration), duration, interval)
+    i, end, w = (signals[name][0] for name in ("phase_current", "phase_current_end", "rotor_speed"))
+    electrical = interval * (signals["phase_voltage"][0] * i).sum()
+    turns = 1.0 - fault[0, :3]
+    R = ACTUATOR.resistance * turns * (1.0 + ACTUATOR.copper_coefficient * fault[0, 5])
+    stored = 0.5 * (ACTUATOR.inductance * turns**2 * end[-1] ** 2).sum() + 0.5 * ACTUATOR.inertia * w[-1] ** 2
+    friction = ACTUATOR.coulomb_friction * np.abs(w) + ACTUATOR.viscous_friction * w**2
+    spent = interval * (R * i**2).sum() + stored + interval * friction.sum()
+    assert electrical > 0.1
+    assert spent == pytest.approx(electrical, rel=1e-3)
+
+
+def test_friction_sticks_below_the_static_limit_and_gives_way_above():
+    """The torque k (i_c - i_b) at the moment of break-away is T_c FSD."""
+    held = simulate(make_runs(ACTUATOR, HEALTHY), command("step", 0.2, amplitude=1e-6, time=0.0), 0.2, 2e-4)
+    assert np.abs(held["phase_current_end"]).max() > 0.1
+    assert np.all(held["rotor_angle"] == 0.0)
+    interval = 1e-6
+    freed = simulate(make_runs(ACTUATOR, HEALTHY), command("step", 0.2, amplitude=1e-5, time=0.0), 0.2, interval)
+    first = int(np.flatnonzero(freed["rotor_angle"][0])[0])
+    end = freed["phase_current_end"][0]
+    torque = ACTUATOR.back_emf * (end[:, 2] - end[:, 1])  # c and b are on their plateaus at zero, a crosses zero
+    limit = ACTUATOR.static_over_coulomb * ACTUATOR.coulomb_friction
+    assert torque[:first].max() <= limit * (1.0 + 1e-9)
+    assert torque[first - 1 : first + 1].max() == pytest.approx(limit, rel=0.04)
+
+
+def test_end_stop_holds():
+    runs = make_runs(ACTUATOR, HEALTHY)
+    runs["end_stop"] = 0.02
+    signals = simulate(runs, command("ramp", 0.3, speed=0.3), 0.3, 2e-4)
+    assert signals["output_position"].max() <= 0.02 * (1.0 + 1e-12)
+    rest = slice(1000, None)
+    np.testing.assert_allclose(signals["output_position"][0, rest], 0.02, rtol=1e-12)
+    assert np.all(signals["rotor_speed"][0, rest] == 0.0)
+    reach = signals["rotor_angle"][0, -1] / ACTUATOR.gear_ratio
+    assert reach == pytest.approx(0.02 + 0.5 * ACTUATOR.backlash, rel=1e-6)
+
+
+@pytest.mark.parametrize("play", [1e-4, 6e-4])
+def test_play_is_as_wide_as_its_parameter(play):
+    runs = make_runs(ACTUATOR, HEALTHY, effects={"backlash": {"blk": play}})
+    signals = simulate(runs, command("reversal", 0.5, amplitude=0.01, speed=0.2), 0.5, 2e-4)
+    lost = signals["rotor_angle"][0] / ACTUATOR.gear_ratio - signals["output_position"][0]
+    assert np.ptp(lost) == pytest.approx(play, rel=1e-6)
+    still = np.diff(signals["output_position"][0]) == 0.0
+    inside = np.abs(lost[1:]) < 0.49 * play
+    assert inside.any() and np.all(still[inside & (np.abs(lost[:-1]) < 0.49 * play)])
+
+
+@pytest.mark.parametrize("fault", [HEALTHY, FAULT])
+def test_locked_rotor_reaches_the_steady_current_of_two_phases(fault):
+    runs = make_runs(ACTUATOR, fault)
+    runs["coulomb_friction"], runs["current_limit"] = 1e3, 1e3
+    duration = 0.05
+    signals = simulate(runs, command("step", duration, amplitude=0.4, time=0.0), duration, 2e-4)
+    turns = 1.0 - fault[0, :3]
+    R = ACTUATOR.resistance * turns * (1.0 + ACTUATOR.copper_coefficient * fault[0, 5])
+    current = signals["phase_current"][0, -1]
+    on = np.abs(current) > 1.0
+    assert on.sum() == 2
+    steady = ACTUATOR.bus_voltage / (R[on].sum() + 2.0 * ACTUATOR.switch_resistance)
+    np.testing.assert_allclose(np.abs(current[on]), steady, rtol=1e-6)
+    np.testing.assert_allclose(signals["phase_voltage"][0, -1, on], (R * current)[on], rtol=1e-6)
+    assert np.all(signals["rotor_angle"] == 0.0)
