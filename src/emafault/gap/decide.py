@@ -20,6 +20,8 @@ from .which import Search, far_outside, groups
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration, and what machines without blind cases of their own are judged by
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
+CONTRADICTED = -0.05  # log10 of the share left on the confirm recordings from which a named set has not helped there
+WITHDRAWN = 0.2  # the most that is still believed of such a set
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,8 @@ def decide(
     if held_out is not None:
         odds += float(np.dot(calibration.confirm, held_out))
     p_right = _sigmoid(odds)
+    if held_out is not None and any(calibration.confirm) and held_out[1] > CONTRADICTED:
+        p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()
     sets = [(c, float(p_gap * p_right * w)) for c, w in zip(group, weights, strict=True)]
