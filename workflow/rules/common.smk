@@ -174,3 +174,23 @@ def whole_configuration(wildcards):
 
 def title_and_question(wildcards):
     return {"title": wildcards.case, "question": composed(wildcards)["question"]}
+
+
+# --- benches and blind cases ---
+
+BENCH = str(config.get("bench", "")).rstrip("/")
+DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
+WITHHELD = f"{RESULTS}/withheld"
+
+
+def bench_files(wildcards):
+    """The files of the bench."""
+    try:
+        return configuration.bench_files(BENCH)
+    except InputError as error:
+        sys.exit(f"emafault: {error}")
+
+
+def withheld_batches(wildcards):
+    """Files of every job of a draw."""
+    return [f"{WITHHELD}/{wildcards.draw}/{rung}_{n}.json" for rung, n in configuration.withheld_jobs(wildcards.draw)]

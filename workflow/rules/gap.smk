@@ -3,16 +3,6 @@
 #   snakemake --cores all diagnose --config bench=PATH                 a bench of the reference actuator
 #   snakemake --cores all diagnose --config bench=PATH twin=NAME       a measured machine
 #   snakemake --cores all retrain --config bench=PATH                  what the named effect does for the network
-BENCH = str(config.get("bench", "")).rstrip("/")
-DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
-
-
-def bench_files(wildcards):
-    """The files of the bench."""
-    try:
-        return configuration.bench_files(BENCH)
-    except InputError as error:
-        sys.exit(f"emafault: {error}")
 
 
 rule diagnose_gap:

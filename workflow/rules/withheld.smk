@@ -1,16 +1,10 @@
 # The withheld check: blind cases, their diagnoses, the scoreboard; and the calibration of the probabilities on a draw of its own.
-WITHHELD = f"{RESULTS}/withheld"
 
 
 wildcard_constraints:
     draw="|".join(configuration.withheld_draws()),
     rung=r"T\d",
     batch=r"\d+",
-
-
-def withheld_batches(wildcards):
-    """Files of every job of a draw."""
-    return [f"{WITHHELD}/{wildcards.draw}/{rung}_{n}.json" for rung, n in configuration.withheld_jobs(wildcards.draw)]
 
 
 rule diagnose_cases:
