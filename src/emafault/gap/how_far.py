@@ -110,16 +110,17 @@ class Ladder:
     after: Rung
 
     def signal(self) -> dict:
-        """The verdict file's entry; the floor is the noise itself."""
-        entry = {
-            "nominal": self.nominal.rms,
-            "recalibrated": self.recalibrated.rms,
-            "placebo": self.placebo,
-            "after": self.after.rms,
-            "floor": 1.0,
-        }
+        """The verdict file's entry; the floor is the noise itself, in whose units the others are.
+
+        A twin whose covariance is cautious says by ``noise_floor`` what root mean square its true model leaves.
+        """
+        noise = float(getattr(self.problem.twin, "noise_floor", 1.0))
+        rungs = {"nominal": self.nominal.rms, "recalibrated": self.recalibrated.rms}
+        rungs |= {"placebo": self.placebo, "after": self.after.rms}
+        entry: dict[str, float | None] = {name: rms / noise for name, rms in rungs.items()}
         size = len(self.problem.cells)
-        return entry | {"closed": closed(self.recalibrated.rms, self.after.rms, 1.0, size)}
+        share = closed(self.recalibrated.rms / noise, self.after.rms / noise, 1.0, size)
+        return entry | {"floor": 1.0, "closed": share}
 
 
 def climb(twin: Twin, confirm: Sequence[str], explore: Problem, null: Point, best: Candidate | None) -> Ladder:

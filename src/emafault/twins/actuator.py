@@ -81,6 +81,7 @@ class ActuatorTwin:
     """
 
     name = "actuator"
+    noise_floor = 0.85  # median on the confirm recordings of the effect-free development cases
 
     def __init__(
         self,
