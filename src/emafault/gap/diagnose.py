@@ -13,7 +13,7 @@ from .how_far import Ladder, climb, closed
 from .inference import Candidate, Point, Problem
 from .twin import INTERVAL, Twin
 from .where import equation_of, where
-from .which import Search, confusability, far_outside, search
+from .which import Search, confusability, search
 
 CONFUSED = 0.9  # cosine of two signatures from which the report calls them hard to tell apart
 
@@ -257,6 +257,3 @@ def fault_ladder(
     floor = float(np.sqrt(np.mean(np.square(typical))))
     entry = {"nominal": None, "recalibrated": recalibrated, "placebo": None, "after": reached, "floor": floor}
     return entry | {"closed": closed(recalibrated, reached, floor, 6 * len(before))}
-
-
-__all__ = ["Diagnosis", "diagnose", "far_outside"]

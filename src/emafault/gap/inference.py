@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from .twin import Hypothesis, Parameter, Twin
+from .twin import Hypothesis, Twin
 
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
@@ -444,8 +444,3 @@ class Problem:
     def squared_distance(self, null: Point, difference: np.ndarray) -> float:
         """d' (C + J S J')^-1 d of a whitened difference of predictions."""
         return float(difference @ self.projected(null, difference[:, None])[:, 0])
-
-
-def effect_index(parameters: Sequence[Parameter], effect: str) -> list[int]:
-    """Indices of an effect's own parameters."""
-    return [m for m, p in enumerate(parameters) if p.effect == effect]
