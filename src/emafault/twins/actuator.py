@@ -15,18 +15,36 @@ from ..faults import FAULT_NAMES
 from ..gap.twin import INTERVAL, Cell, Hypothesis, Parameter
 from ..recording import Recording
 from .actuator_noise import CHANNELS, channel_spread, noise_covariance
-from .actuator_statistics import _COMMUTATION, _SPEED, LATTICE, SIZE, Computed, Nominal, cells_of, compute
+from .actuator_statistics import (
+    _COMMUTATION,
+    _PER_PHASE,
+    _SPEED,
+    _SUM_I,
+    LATTICE,
+    SIZE,
+    Computed,
+    Nominal,
+    cells_of,
+    compute,
+)
 
 HEALTHY_DEVIATION = 5e-4  # of N and xi in a recording called healthy (the format allows 1e-3)
 SOAK_DEVIATION = 0.5  # K, of the true ambient temperature about the measured
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
-JITTER_REPEATS = 6
+JITTER_REPEATS = 8
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
 START_SCATTER = 2e-3  # rad, over which commutations fall differently between the recording instants
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
+#: statistics of the three phases, (phase, statistic)
+ALIKE = (
+    np.arange(3 * _PER_PHASE).reshape(3, -1),
+    np.arange(_SUM_I + 1, _SUM_I + 4).reshape(3, 1),
+    np.arange(_SUM_I + 4, _SUM_I + 7).reshape(3, 1),
+    np.arange(_COMMUTATION, SIZE).reshape(3, -1),
+)
 _TOLERANCES = {
     (effect.id, name): parameter
     for effect in EFFECTS.values()
@@ -266,7 +284,7 @@ class ActuatorTwin:
 
         def work(item):
             key, (name, run) = item
-            return key, self._statistics_of(name, run).values
+            return key, self._statistics_of(name, run)
 
         if self.threads > 1 and len(new) > 1:
             with ThreadPoolExecutor(self.threads) as pool:
@@ -315,7 +333,7 @@ class ActuatorTwin:
         out["commanded_position"] = b.signals["commanded_position"]
         return out
 
-    def _statistics_of(self, name: str, run: np.void, keep: bool = False) -> Computed:
+    def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
         signals = self._simulate(name, run)
         step = float(run["speed_quantisation_step"])
         if step > 0.0:
@@ -323,7 +341,12 @@ class ActuatorTwin:
             rng = np.random.default_rng(np.frombuffer(run.tobytes(), np.uint32))
             noisy = signals["rotor_speed"] + sigma * rng.standard_normal(len(signals["rotor_speed"]))
             signals["rotor_speed"] = step * np.round(noisy / step)
-        return compute(self._brought[name].nominal, signals, keep)
+        return self._compared(name, signals)
+
+    def _compared(self, name: str, signals: dict) -> np.ndarray:
+        """(statistic,) statistics of simulated signals as they compare with the recording's."""
+        b = self._brought[name]
+        return compute(b.nominal, signals).on_ripple_of(b.computed.norm)
 
     # ---- noise
     def settle(self, values: np.ndarray, part: Sequence[str]) -> None:
@@ -406,13 +429,13 @@ class ActuatorTwin:
         """Mean shift of the statistics by noise in their regressors."""
         b = self._brought[name]
         rng = np.random.default_rng(1)
-        still = compute(b.nominal, clean).values
+        still = self._compared(name, clean)
         total = np.zeros(SIZE)
         for _ in range(NOISE_REPEATS):
             noisy = dict(clean)
             for channel, signal in CHANNELS.items():
                 noisy[signal] = clean[signal] + b.noise[channel] * rng.standard_normal(clean[signal].shape)
-            total += compute(b.nominal, noisy).values
+            total += self._compared(name, noisy)
         self._offset[name] = total / NOISE_REPEATS - still
         self._offset[name][LATTICE] = 0.0
 
@@ -426,20 +449,8 @@ class ActuatorTwin:
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            if b.jitter is None or b.settled in (
-                0,
-                1,
-                3,
-            ):  # the second of a null fit's two rounds moves too little to simulate it anew
-                repeats = []
-                command = b.command
-                for shift, offset in zip(shifts[name], offsets[name], strict=True):
-                    moved = run.copy()
-                    moved["theta_0"] += shift
-                    b.command = command + offset
-                    repeats.append(self._statistics_of(name, moved).values)
-                b.command = command
-                b.jitter = np.var(repeats, axis=0, ddof=1) * 1.4
+            if b.jitter is None or b.settled <= 3:
+                b.jitter = self._jitter(name, run, shifts[name], offsets[name])
             jitter = b.jitter
             cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
@@ -462,6 +473,22 @@ class ActuatorTwin:
             out[at : at + len(block), at : at + len(block)] = block
             at += len(block)
         return out
+
+    def _jitter(self, name: str, run: np.void, shifts: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        """(statistic,) variance over simulations of the same physics that switch at other instants."""
+        b = self._brought[name]
+        command, repeats = b.command, []
+        for shift, offset in zip(shifts, offsets, strict=True):
+            moved = run.copy()
+            moved["theta_0"] += shift
+            moved["hysteresis"] *= 1.0 + shift
+            b.command = command + offset
+            repeats.append(self._statistics_of(name, moved))
+        b.command = command
+        variance = np.var(repeats, axis=0, ddof=1)
+        for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
+            variance[alike] = 0.5 * (variance[alike] + variance[alike].mean(axis=0))
+        return variance * (1.0 + 2.0 / len(repeats))
 
     # ---- what the verdict says
     def report(

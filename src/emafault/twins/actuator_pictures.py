@@ -61,7 +61,7 @@ def worst_region(diagnosis: Diagnosis) -> Region | None:
         points["after"] = diagnosis.found.candidates[0].point.values
     brought = twin._brought[name]
     runs = {rung: twin._runs(values[None, :], name)[0] for rung, values in points.items()}
-    computed = {rung: twin._statistics_of(name, run, keep=True) for rung, run in runs.items()}
+    computed = {rung: compute(brought.nominal, twin._simulate(name, run), keep=True) for rung, run in runs.items()}
     row = EQUATIONS.index(worst.equation)
     alike = [m for m, c in enumerate(cells_of(name)) if (c.equation, c.along) == (worst.equation, worst.along)]
     counts = np.any(brought.computed.regressors[alike] != 0.0, axis=0)

@@ -5,6 +5,9 @@ phi, so
 that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The same
 code
 runs on measured and on simulated recordings. Residuals use the nominal parameters at the measured ambient temperature.
+
+A residual holds the noise of its own phase's di/dt, so what is regressed on di/dt takes the other two phases' instead
+(their sum is -di/dt) as an instrument z: ``sum z r / sqrt(sum z di/dt)``.
 """
 
 from dataclasses import dataclass
@@ -39,6 +42,7 @@ WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
 REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
 JUMP_SPEED = 100.0  # rad/s by which the speed reference jumps in one interval when the command steps
 ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
+WEAKEST_INSTRUMENT = 0.05  # of an instrument's power that must be the current's own and not noise
 COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
 
 
@@ -133,6 +137,8 @@ _CONTROL = _BUS + 3
 _COMMUTATION = _CONTROL + 3
 LATTICE = _SPEED + 4
 OSCILLATION = _POSITION + 5
+#: statistics of di/dt; how much of it the samples show depends on where they fall on the switching ripple
+RIPPLE = np.array([j * _PER_PHASE + m for j in range(3) for m in (3, 4, 16)])
 _SPEEDS = np.array(SPEED_EDGES)
 _ORDER_LIST = np.array(ORDERS, float)
 _COS_AXIS, _SIN_AXIS = np.cos(AXIS), np.sin(AXIS)
@@ -180,6 +186,17 @@ def _put(m, n, phi, r, y, norm, count, store):
     count[m] += 1
     if store.shape[0] > 0:
         store[m, n] = phi
+
+
+@compiled
+def _put_instrument(m, n, z, phi, r, y, norm, power, count, store):
+    """As ``_put`` with an instrument z whose noise is independent of that of r and phi."""
+    y[m] += z * r
+    norm[m] += z * phi
+    power[m] += z * z
+    count[m] += 1
+    if store.shape[0] > 0:
+        store[m, n] = z
 
 
 @compiled
@@ -246,6 +263,7 @@ def fill_statistics(
     y[:] = 0.0
     norm[:] = 1e-12
     count[:] = 0
+    power = np.zeros(y.shape[0])
     ramp = np.pi / 6.0
     w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
     speed_and_acceleration(theta, dt, w_all, acceleration, slow)
@@ -294,8 +312,12 @@ def fill_statistics(
             floating[j] = off_now * was_off[j]
             was_off[j] = off_now
         for j in range(3):
+            others = 0.0
             if has_end:
                 di = (i_end[n, j] - i_end[n - 1, j]) / dt
+                for q in range(3):
+                    if q != j:
+                        others -= (i_end[n, q] - i_end[n - 1, q]) / dt
             else:
                 di = (i[min(n + 1, n_time - 1), j] - i[n - 1, j]) / (2.0 * dt)
             r = V[n, j] - R * i[n, j] - L * di - k * f[j] * w
@@ -312,8 +334,9 @@ def fill_statistics(
                 _put(base, n, s * w, r, y, norm, count, store)
                 _put(base + 1, n, i[n, j], r, y, norm, count, store)
                 _put(base + 2, n, 1.0, r, y, norm, count, store)
-                _put(base + 3, n, di, r, y, norm, count, store)
-                _put(base + 4, n, i[n, j] * i[n, j] * di, r, y, norm, count, store)
+                _put_instrument(base + 3, n, others, di, r, y, norm, power, count, store)
+                square = i[n, j] * i[n, j]
+                _put_instrument(base + 4, n, square * others, square * di, r, y, norm, power, count, store)
                 _put(base + 5, n, s * w * cos_1, r, y, norm, count, store)
                 _put(base + 6, n, s * w * sin_1, r, y, norm, count, store)
                 _put(base + 7, n, i[n, j] * t, r, y, norm, count, store)
@@ -328,7 +351,7 @@ def fill_statistics(
                 _put(base + 15, n, f[j] * w * sin_1, r, y, norm, count, store)
                 _put(_SUM_I + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
             else:
-                _put(base + 16, n, di, r, y, norm, count, store)
+                _put_instrument(base + 16, n, others, di, r, y, norm, power, count, store)
                 _put(base + 17, n, i[n, j], r, y, norm, count, store)
                 _put(base + 18, n, f[j] * w, r, y, norm, count, store)
             if span < 0.35:
@@ -435,12 +458,11 @@ def fill_statistics(
                 elif 0.0 <= half - (np.pi - ramp) < WINDOW:
                     _put(base + 3, n, 1.0, share, y, norm, count, store)
     for m in range(y.shape[0]):
+        norm[m] = max(norm[m], WEAKEST_INSTRUMENT * power[m])
         y[m] /= np.sqrt(norm[m])
     if not has_end:
         # mean currents cannot give di/dt across a switching ripple: what is regressed on it says nothing
-        for j in range(3):
-            for m in (3, 4, 16):
-                count[j * _PER_PHASE + m] = 0
+        count[RIPPLE] = 0
     # lattice of a rounded speed: the smallest spacing of its values where all spacings are multiples of it, else zero
     ordered = np.sort(speed)
     spacing = 1.0e9
@@ -470,6 +492,12 @@ class Computed:
     count: np.ndarray
     residual: np.ndarray
     regressors: np.ndarray
+
+    def on_ripple_of(self, norm: np.ndarray) -> np.ndarray:
+        """(statistic,) values with those of di/dt as slopes times the square root of another recording's norms."""
+        out = self.values.copy()
+        out[RIPPLE] *= np.sqrt(np.clip(norm[RIPPLE] / self.norm[RIPPLE], 0.0, 1e3))
+        return out
 
 
 _EMPTY = np.zeros((0, 0))
