@@ -35,7 +35,7 @@ def refit(problem: Problem, values: np.ndarray, free: Sequence[int]) -> Rung:
     prediction = problem.predict(values)[0]
     jacobian = np.zeros((len(problem.cells), 0))
     if free:
-        jacobian = problem.nuisance_jacobian(values, prediction, free)
+        jacobian = problem.nuisance_jacobian(values, prediction, free, exact=False)
         for _ in range(2):
             moved = problem.solve(values, prediction, jacobian, free)
             trial = problem.predict(moved)[0]

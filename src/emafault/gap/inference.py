@@ -15,6 +15,7 @@ from .twin import Hypothesis, Twin
 
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
+SETTLED = 1.0  # prior standard deviations that a fit within the noise may still move for its derivatives to be kept
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -42,6 +43,7 @@ class Candidate:
     refined: bool
     start: np.ndarray
     signature: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (statistic, parameter)
+    polished: bool = False
 
 
 class Problem:
@@ -105,15 +107,18 @@ class Problem:
         """(point, parameter) -> (point, statistic)."""
         return self.twin.predict(np.atleast_2d(points), self.part)
 
-    def nuisance_jacobian(self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int]) -> np.ndarray:
+    def nuisance_jacobian(
+        self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int], exact: bool = True
+    ) -> np.ndarray:
         """(statistic, free) forward differences; parameters of disjoint recordings are moved together.
 
         A twin may know some derivatives exactly from others: ``derived`` names them and ``derive(name, values,
         derivative,
         recording)`` gives the rows of one recording from a function that returns those of another parameter. What
-        cancels exactly in truth then cancels here too, where noisy differences would feign information.
+        cancels exactly in truth then cancels here too, where noisy differences would feign information. ``exact`` False
+        leaves this out, for a few parameters that nothing else can cancel.
         """
-        derived = set(getattr(self.twin, "derived", ()))
+        derived = set(getattr(self.twin, "derived", ())) if exact else set()
         known = [m for m in free if self.parameters[m].name in derived]
         asked = list(free)
         if known:
@@ -275,6 +280,8 @@ class Problem:
             shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
             values = best.values
             near = 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells)
+            if round_ == 1 and best.objective < len(self.cells) and shifted.max() < SETTLED:
+                break
             if round_ > 1 and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
                 break
             before = best.objective if round_ > 0 else np.inf
@@ -324,16 +331,18 @@ class Problem:
             for start in h.starts:
                 full = null.values.copy()
                 full[own] = start
-                first = len(points)
-                points.append(full)
+                first: int | None = None
+                if not h.additive:
+                    first = len(points)
+                    points.append(full)
                 partial = []
                 for c, m in enumerate(own):
-                    if start[c] == self.parameters[m].off or len(own) == 1:
+                    if start[c] == self.parameters[m].off or (len(own) == 1 and not h.additive):
                         continue
-                    without = full.copy()
-                    without[m] = self.parameters[m].off
+                    other = (null.values if h.additive else full).copy()
+                    other[m] = start[c] if h.additive else self.parameters[m].off
                     partial.append((c, len(points)))
-                    points.append(without)
+                    points.append(other)
                 plan.append((h, own, np.array(start), first, partial))
         predictions = self.predict(np.array(points)) if points else np.zeros((0, len(self.cells)))
         out = []
@@ -348,9 +357,14 @@ class Problem:
                 columns = null.jacobian[:, [free.index(m) for m in own]]
                 out.append(Candidate((h.effect,), fitted, gain, False, null.values, columns))
         for h, own, begin_at, first, partial in plan:
-            full = predictions[first]
             columns = np.zeros((len(self.cells), len(own)))
             off = np.array([self.parameters[m].off for m in own])
+            if first is None:
+                for c, at in partial:
+                    columns[:, c] = (predictions[at] - null.prediction) / (begin_at[c] - off[c])
+                out.append(self.linear(null, (h,), null.values, null.prediction, columns))
+                continue
+            full = predictions[first]
             if len(own) == 1:
                 columns[:, 0] = (full - null.prediction) / (begin_at[0] - off[0])
             for c, at in partial:
@@ -408,6 +422,8 @@ class Problem:
 
     def polish(self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis]) -> Candidate:
         """The candidate fitted to the end, all derivatives taken at its own fit; what is reported comes from here."""
+        if candidate.polished:
+            return candidate
         chosen = [hypotheses[e] for e in candidate.effects]
         own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
@@ -417,7 +433,8 @@ class Problem:
         jacobian = np.concatenate([base, columns], axis=1)
         start = self.point(point.values, point.prediction, jacobian, point.free, widened)
         best = self.descend(start, widened)
-        return replace(candidate, point=best, gain=best.log_evidence - null.log_evidence, signature=columns)
+        gain = best.log_evidence - null.log_evidence
+        return replace(candidate, point=best, gain=gain, signature=columns, polished=True)
 
     def _effect_columns(self, at: Point, own: Sequence[int]) -> np.ndarray:
         """(statistic, own) differences by the parameters of effects, simulated at a fit."""

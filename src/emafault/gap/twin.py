@@ -55,13 +55,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One candidate cause: its parameters by name and the points at which a fit starts (one value per parameter)."""
+    """One candidate cause: its parameters by name and the points at which a fit starts (one value per parameter).
+
+    Where each parameter acts alone (``additive``), a fit starts where all are off, with signatures taken one by one.
+    """
 
     effect: str
     equations: tuple[str, ...]
     parameters: tuple[str, ...]
     starts: tuple[tuple[float, ...], ...]
     kind: str = "structural"  # or calibration
+    additive: bool = False
 
 
 class Twin(Protocol):

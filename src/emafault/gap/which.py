@@ -119,6 +119,10 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         if not new:
             break
         top = max(new, key=lambda c: c.gain)
+        if beam and top.gain > beam[0].gain + addition and not beam[0].polished:
+            # what a set lacks in convergence is not to be had by one more effect
+            accept(problem.polish(null, beam[0], by_id))
+            beam = _best(tried, size - 1)[:2]
         if beam and top.gain < beam[0].gain + addition:
             break
         beam = _best(tried, size)[:2]
@@ -180,14 +184,11 @@ def _grow(
 
 
 def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothesis], accept) -> None:
-    """Refit the best set without each of its members, where that has not been tried: a member may have become idle."""
+    """Refit the best set without each of its members from where it ended: a member may be idle, or have only helped
+    the others on their way."""
     best = max(tried.values(), key=lambda c: c.gain, default=None)
     while best is not None and len(best.effects) > 1:
         for effect in best.effects:
-            key = tuple(sorted(e for e in best.effects if e != effect))
-            parts = [tried[(e,)].gain for e in key if (e,) in tried]
-            if key in tried and tried[key].gain >= max(parts, default=-np.inf):
-                continue  # it has converged: no worse than any of its own members
             kept = tuple(e for e in best.effects if e != effect)
             chosen = [by_id[e] for e in kept]
             own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]

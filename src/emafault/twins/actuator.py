@@ -34,6 +34,7 @@ MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
+FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
 START_SCATTER = 2e-3  # rad, over which commutations fall differently between the recording instants
@@ -61,6 +62,8 @@ _STARTS: dict[str, tuple[tuple[float, ...], ...]] = {
     "speed_quantisation": ((1.0,),),
     "virtual_neutral": ((1.0,),),
 }
+#: effects with a parameter that does nothing while another is off
+_JOINT = ("stribeck", "compliance")
 #: parameters in which an effect is fitted where the catalogue's own are ill-behaved at zero: name -> (units, low, high)
 _OWN: dict[str, dict[str, tuple[str, float, float]]] = {
     "dynamic_eccentricity": {"d_cos": ("1", -0.06, 0.06), "d_sin": ("1", -0.06, 0.06)},
@@ -257,7 +260,9 @@ class ActuatorTwin:
                 starts = ((float(np.median(seen)) if max(seen) > 0 else 1.0,),)
             if starts is None:
                 starts = (tuple(p.off + (0.25 * p.sd if p.high > p.off else -0.25 * p.sd) / 0.6 for p in own),)
-            out.append(Hypothesis(effect.id, effect.equations, tuple(p.name for p in own), starts))
+            additive = len(own) > 1 and effect.id not in _JOINT
+            names = tuple(p.name for p in own)
+            out.append(Hypothesis(effect.id, effect.equations, names, starts, additive=additive))
         return out
 
     # ---- statistics
@@ -442,6 +447,7 @@ class ActuatorTwin:
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         blocks = []
+        first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
         rng = np.random.default_rng(2)
         shifts = {name: START_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
         offsets = {name: COMMAND_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
@@ -450,7 +456,8 @@ class ActuatorTwin:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
             if b.jitter is None or b.settled <= 3:
-                b.jitter = self._jitter(name, run, shifts[name], offsets[name])
+                count = FIRST_REPEATS if first else JITTER_REPEATS
+                b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
             jitter = b.jitter
             cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS

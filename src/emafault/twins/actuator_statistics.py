@@ -263,7 +263,7 @@ def fill_statistics(
     y[:] = 0.0
     norm[:] = 1e-12
     count[:] = 0
-    power = np.zeros(y.shape[0])
+    power, cross, cross_power = np.zeros(y.shape[0]), np.zeros(3), np.zeros(3)
     ramp = np.pi / 6.0
     w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
     speed_and_acceleration(theta, dt, w_all, acceleration, slow)
@@ -337,6 +337,8 @@ def fill_statistics(
                 _put_instrument(base + 3, n, others, di, r, y, norm, power, count, store)
                 square = i[n, j] * i[n, j]
                 _put_instrument(base + 4, n, square * others, square * di, r, y, norm, power, count, store)
+                cross[j] += square * others * di
+                cross_power[j] += square * others * others
                 _put(base + 5, n, s * w * cos_1, r, y, norm, count, store)
                 _put(base + 6, n, s * w * sin_1, r, y, norm, count, store)
                 _put(base + 7, n, i[n, j] * t, r, y, norm, count, store)
@@ -457,8 +459,20 @@ def fill_statistics(
                     _put(base + 2, n, 1.0, share - 1.0, y, norm, count, store)
                 elif 0.0 <= half - (np.pi - ramp) < WINDOW:
                     _put(base + 3, n, 1.0, share, y, norm, count, store)
+    # i^2 counts from its mean by the instrument's weight: an inductance that is merely another leaves no trace then
+    for j in range(3):
+        m = j * _PER_PHASE + 3
+        if norm[m] > WEAKEST_INSTRUMENT * power[m]:
+            mean = cross[j] / norm[m]
+            y[m + 1] -= mean * y[m]
+            norm[m + 1] -= mean * cross[j]
+            power[m + 1] += mean * (mean * power[m] - 2.0 * cross_power[j])
+            if store.shape[0] > 0:
+                store[m + 1] -= mean * store[m]
     for m in range(y.shape[0]):
-        norm[m] = max(norm[m], WEAKEST_INSTRUMENT * power[m])
+        if norm[m] < WEAKEST_INSTRUMENT * power[m]:
+            norm[m] = WEAKEST_INSTRUMENT * power[m]
+            count[m] = 0
         y[m] /= np.sqrt(norm[m])
     if not has_end:
         # mean currents cannot give di/dt across a switching ripple: what is regressed on it says nothing
