@@ -339,7 +339,9 @@ class ActuatorTwin:
         return out
 
     def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
-        signals = self._simulate(name, run)
+        return self._as_recorded(name, run, self._simulate(name, run))
+
+    def _as_recorded(self, name: str, run: np.void, signals: dict) -> np.ndarray:
         step = float(run["speed_quantisation_step"])
         if step > 0.0:
             sigma = self._brought[name].noise.get("speed", 0.0)
@@ -489,8 +491,12 @@ class ActuatorTwin:
             moved = run.copy()
             moved["theta_0"] += shift
             moved["hysteresis"] *= 1.0 + shift
-            b.command = command + offset
-            repeats.append(self._statistics_of(name, moved))
+            if len(b.jumps):
+                b.command = command + offset
+            signals = self._simulate(name, moved)
+            if len(b.jumps):
+                signals["commanded_position"] = signals["commanded_position"] + offset
+            repeats.append(self._as_recorded(name, moved, signals))
         b.command = command
         variance = np.var(repeats, axis=0, ddof=1)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly

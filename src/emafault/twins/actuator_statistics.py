@@ -41,6 +41,7 @@ MARGIN = np.deg2rad(3.5)  # electrical, kept from the corners of the trapezoid
 WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
 REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
 JUMP_SPEED = 100.0  # rad/s by which the speed reference jumps in one interval when the command steps
+REGULATOR_SMOOTHING = 5.0e-4  # s, half span over which the current's reference is averaged before its slope is taken
 ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
 WEAKEST_INSTRUMENT = 0.05  # of an instrument's power that must be the current's own and not noise
 COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
@@ -112,7 +113,7 @@ def _specification() -> list[tuple[str, str, str, float, float]]:
         out.append((f"play {label}", "position", along, 0.0, 0.0))
     for label, along in (("constant", "direction"), ("current", "current"), ("power", "rotor_speed")):
         out.append((f"bus {label}", "bus", along, 0.0, 0.0))
-    for label in ("slope", "slope -1", "slope -2"):
+    for label in ("slope ahead", "slope", "slope before"):
         out.append((f"regulator {label}", "control", "time", 0.0, 0.0))
     for letter in "abc":
         for label in COMMUTATIONS:
@@ -271,8 +272,8 @@ def fill_statistics(
     electromagnetic_torque(c, dt, i, theta, torque)
     lag = int(max(1.0, round(0.01 / dt)))  # the regulator's residual is differenced over 10 ms: its drift is only noise
     after_jump = -3 * lag
-    regulator = np.zeros(n_time)
-    pair_mean = np.zeros(n_time)
+    regulator, fresh = np.zeros(n_time), np.zeros(n_time, np.int64)
+    pair_mean, asked = np.zeros(n_time), np.zeros(n_time)
     integral, demand = 0.0, 0.0
     f, slope, x = np.empty(3), np.empty(3), np.empty(3)
     turn_cos, turn_sin = np.empty(len(ORDERS)), np.empty(len(ORDERS))
@@ -436,15 +437,10 @@ def fill_statistics(
             elif np.pi <= shifted < 5.0 * np.pi / 3.0:
                 minus = j
         pair_mean[n] = 0.5 * (i[n, plus] - i[n, minus])
-        regulator[n] = pair_mean[n] - before
+        regulator[n], asked[n] = pair_mean[n] - before, demand
         if abs(command[n] - command[n - 1]) * ratio * K_pos > JUMP_SPEED:
             after_jump = n  # when within its interval a step came is not recorded
-        if n > lag + 3 and n < n_time - 1 and n > after_jump + 2 * lag:
-            r = regulator[n] - regulator[n - lag]
-            residual[9, n] = r
-            for m in range(3):
-                rise = pair_mean[n - m] - pair_mean[n - m - 1]
-                _put(_CONTROL + m, n, rise, r, y, norm, count, store)
+        fresh[n] = n - after_jump
         # ---- currents around the commutations
         if in_motion and abs(pair_mean[n]) > 0.2:
             for j in range(3):
@@ -459,6 +455,21 @@ def fill_statistics(
                     _put(base + 2, n, 1.0, share - 1.0, y, norm, count, store)
                 elif 0.0 <= half - (np.pi - ramp) < WINDOW:
                     _put(base + 3, n, 1.0, share, y, norm, count, store)
+    # ---- the regulator's residual beside the slope of its reference, smooth so that noise does not drown it
+    reach = int(max(1.0, round(REGULATOR_SMOOTHING / dt)))
+    total = np.zeros(n_time + 1)
+    for n in range(n_time):
+        total[n + 1] = total[n] + asked[n]
+    span_all = 6 * reach + 1
+    for n in range(max(lag, span_all), n_time - span_all):
+        if fresh[n] > 2 * lag and fresh[n + span_all] > 0:
+            r = regulator[n] - regulator[n - lag]
+            residual[9, n] = r
+            for m in range(3):
+                at = n + 2 * reach * (1 - m)
+                later = total[at + 2 * reach + 1] - total[at + 1]
+                earlier = total[at] - total[at - 2 * reach]
+                _put(_CONTROL + m, n, (later - earlier) / (2 * reach), r, y, norm, count, store)
     # i^2 counts from its mean by the instrument's weight: an inductance that is merely another leaves no trace then
     for j in range(3):
         m = j * _PER_PHASE + 3
