@@ -21,8 +21,9 @@ OUTPUTS = {"N": ("N", 1.0, 5), "xi": ("ξ", 1.0, 5), "dT": ("ΔT (K)", 1.0, 3)}
 CHOICES = (
     "The paper gives no motor, controller or noise figures. Those used here are this project's choices (conf/actuator, "
     "conf/sensors); the paper fixes the faults and their ranges, the copper coefficient, the parabolic command, 600 "
-    "runs of 1 s with the first 50 ms dropped, the reconstruction and the network. The figures compare methods on "
-    "equal terms; they do not reproduce the paper's own data set."
+    "runs of 1 s with the first 50 ms dropped, the reconstruction and the network. The paper has none of the further "
+    "passes of training.reweight, in which each output counts by its own error. The figures compare methods on equal "
+    "terms; they do not reproduce the paper's own data set."
 )
 
 
@@ -72,7 +73,7 @@ def draw_report(
         history = read_json(folder / "history.json")
         if history["curves"]:
             curves[named(folder.parent.name, folder.name)] = history["curves"]
-    text = "Learning curves. Training stops after the failed validation checks asked for and keeps the best epoch."
+    text = "Learning curves of the first pass, which stops after the failed validation checks asked for."
     page.figure("learning_curves", search_figures.learning_curves(curves), text)
     if search:
         trials, chosen = (read_json(path) for path in search)
