@@ -200,7 +200,8 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
     text = (
         "Mean absolute errors on fresh rows; ± is the standard deviation over seeds. Rows named weighted use plateau "
         "samples and stand beside that bound, all others beside the bound with floating-phase samples. The bound comes "
-        "from the voltage-current-speed equations with R, k, L and offset of each phase free."
+        "from the voltage-current-speed equations with R, k, L and offset of each phase free; the magnets' lag "
+        "behind the winding and the healthy unit's R and k count as known to it."
     )
     page.paragraph(text, "small")
     if any(entry.get("unidentified") for entry in table["results"]):
