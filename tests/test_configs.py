@@ -36,6 +36,7 @@ def test_every_option_of_a_group_composes(group, tmp_path):
         ("command=fast", ("command", "'fast'", "parabolic", "sine")),
         ("command=sine command.frequency=-1", ("command.frequency", "-1", "above 0")),
         ("command=file command.path=nowhere.csv", ("command.path", "nowhere.csv", "existing file")),
+        ("reconstruction.weighted.discard=0.9", ("reconstruction.weighted.discard", "0.9", "0.15 s less")),
         ("sampling.runs=1.5", ("sampling.runs", "1.5", "integer")),
         ("sampling.runs=true", ("sampling.runs", "True", "integer")),
         ("actuator.inertia=-1", ("actuator.inertia", "-1", "above 0")),
@@ -162,3 +163,10 @@ def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_pa
     assert digest() == first
     (package / "part" / "inner.py").write_text("y = 2\n")
     assert digest() != first
+
+
+def test_only_the_papers_recipe_drops_the_start_and_the_bound_drops_what_no_method_uses():
+    paper = config.compose("paper", ["reconstruction.weighted.discard=0.1"])
+    kept = {name: entry["discard"] for name, entry in paper["reconstruction"].items()}
+    assert kept == {"paper": 0.05, "weighted": 0.1, "weighted_floating": 0.0}
+    assert config.bound_spec(paper)["discard"] == 0.0

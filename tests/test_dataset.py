@@ -1,12 +1,20 @@
 """Datasets: the same numbers however they are shared out, readable run by run, refused in one line when damaged."""
 
+import errno
+import shutil
+from types import SimpleNamespace
+
 import netCDF4
 import numpy as np
 import pytest
 
 from emafault import config, dataset
+from emafault.actuator.parameters import ActuatorParameters
 from emafault.errors import InputError
-from emafault.study.features import read_features
+from emafault.progress import one_line_errors
+from emafault.reconstruction import reconstruct
+from emafault.recording import replace_atomically
+from emafault.study.features import read_features, reconstruct_features
 
 RUNS = 11
 
@@ -111,3 +119,37 @@ def test_a_folder_that_cannot_be_written_is_refused_and_nothing_is_left(tmp_path
     with pytest.raises(InputError, match="cannot be written"):
         dataset.simulate_shard(tmp_path / "blocked" / "shard_0.nc", _spec(shards=1), 0)
     assert [p.name for p in tmp_path.iterdir()] == ["blocked"]
+
+
+@pytest.mark.parametrize("method", ["weighted", "angle_resolved"])
+def test_features_written_block_by_block_are_those_of_all_runs_at_once(tmp_path, monkeypatch, method):
+    monkeypatch.setattr(dataset, "BLOCK", 2)
+    shards = _write(tmp_path, _spec(shards=2))
+    chosen = config.compose("rotor_angle_eccentricity", ["reconstruction=[weighted,angle_resolved]"])
+    spec = config.reconstruction_spec(chosen, method)
+    reconstruct_features([str(path) for path in shards], spec, tmp_path / "features.nc")
+    settings = {key: value for key, value in spec["settings"].items() if key != "method"}
+    whole = reconstruct(method, _join(shards), 1e-3, ActuatorParameters(**spec["actuator"]), settings)
+    table = read_features(tmp_path / "features.nc")
+    np.testing.assert_array_equal(table.features.six, whole.six)
+    np.testing.assert_array_equal(table.features.covariance, whole.covariance)
+    if method == "angle_resolved":
+        np.testing.assert_array_equal(table.inputs[:, 6:], whole.extras["xi"])
+
+
+def test_a_full_disk_ends_in_one_line_though_the_log_cannot_be_written_either(capsys):
+    with pytest.raises(SystemExit), one_line_errors("/dev/full"):
+        raise OSError(errno.ENOSPC, "No space left on device", "results/a.nc")
+    assert capsys.readouterr().err == "emafault: results/a.nc: cannot be used (No space left on device)\n"
+
+
+def test_a_full_disk_is_named_where_the_library_does_not(tmp_path, monkeypatch):
+    def write(temporary):
+        temporary.write_text("half")
+        raise RuntimeError("NetCDF: HDF error")
+
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=0))
+    (tmp_path / "a.nc").write_text("made before")
+    with pytest.raises(InputError, match=r"a.nc: cannot be written \(No space left on device\)$"):
+        replace_atomically(tmp_path / "a.nc", write)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.nc", "made before")]

@@ -60,8 +60,10 @@ def check_configuration(config: Mapping[str, Any]) -> None:
         schema.refuse(
             "recording.duration", recording["duration"], f"a whole number of {recording['interval']} s intervals"
         )
-    if recording["discard"] > recording["duration"] - 0.15:
-        schema.refuse("recording.discard", recording["discard"], "at least 0.15 s less than recording.duration")
+    discards = {f"reconstruction.{name}.discard": entry["discard"] for name, entry in config["reconstruction"].items()}
+    for key, discard in {"recording.discard": recording["discard"], **discards}.items():
+        if discard > recording["duration"] - 0.15:
+            schema.refuse(key, discard, "at least 0.15 s less than recording.duration")
     if config["sampling"]["shards"] > min(config["sampling"]["runs"], config["sampling"]["fresh"]):
         schema.refuse("sampling.shards", config["sampling"]["shards"], "no more than sampling.runs and sampling.fresh")
     _check_space(config["search"]["space"])

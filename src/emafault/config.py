@@ -224,11 +224,12 @@ def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any
 
 
 def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
-    """What the Cramer-Rao bound of the fresh rows reads."""
+    """What the Cramer-Rao bound of the fresh rows reads: all samples that any least-squares method uses."""
+    methods = [entry for entry in config["reconstruction"].values() if entry["method"] != "paper"]
     spec = {
         "dataset": dataset_spec(config, "fresh"),
         "runs": min(config["evaluation"]["bound_runs"], config["sampling"]["fresh"]),
-        "discard": config["recording"]["discard"],
+        "discard": min((entry["discard"] for entry in methods), default=config["recording"]["discard"]),
         "magnet_coefficient": magnet_coefficient(config),
     }
     return recursively_sorted(spec)

@@ -21,6 +21,7 @@ from .progress import progress, say
 from .recording import PHASES, VARIABLES, Recording, replace_atomically
 
 BLOCK = 25  # runs simulated, written and read at a time
+CHUNK_CACHE = 2**20  # bytes a variable; chunks are written and read whole, the library's 16 MB would only fill up
 
 
 @dataclass(frozen=True)
@@ -194,10 +195,10 @@ def _create(file, spec: Mapping[str, Any], runs: int, samples: int) -> None:
     time = file.createVariable("time", "f8", ("time",))
     time.units, time.long_name = "s", "end of each recording interval"
     time[:] = spec["recording"]["interval"] * np.arange(1, samples + 1)
-    compression = {"compression": "zlib", "complevel": 1, "shuffle": True}
+    storage = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunk_cache": CHUNK_CACHE}
     for name, (phased, unit, _, long_name) in VARIABLES.items():
         dims, chunk = (("run", "phase", "time"), (1, 3, samples)) if phased else (("run", "time"), (1, samples))
-        variable = file.createVariable(name, "f4", dims, chunksizes=chunk, fill_value=False, **compression)
+        variable = file.createVariable(name, "f4", dims, chunksizes=chunk, fill_value=False, **storage)
         variable.units, variable.long_name = unit, long_name
     ambient = file.createVariable("ambient_temperature", "f8", ("run",), fill_value=False)
     ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
@@ -238,6 +239,8 @@ def read_blocks(paths: Sequence[str | Path], names: Sequence[str] | None = None)
                 if missing or "run" not in file.dimensions:
                     raise InputError(f"{path}: not a dataset of runs, {missing[0] if missing else 'run'} is missing")
                 file.set_auto_mask(False)
+                for name in VARIABLES:
+                    file[name].set_var_chunk_cache(CHUNK_CACHE)
                 time = file["time"][:]
                 interval = float((time[-1] - time[0]) / (len(time) - 1))
                 first = int(file.getncattr("first_run"))

@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TextIO, TypeVar
+from typing import BinaryIO, TypeVar
 
 from .errors import InputError
 
@@ -25,11 +25,13 @@ def progress(items: Iterable[T], label: str, total: int, every: float = 3.0) -> 
 
 def say(text: str) -> None:
     """One line on the standard error stream, and in the log of the script that runs."""
-    for stream in (sys.stderr, *_logs):
-        print(text, file=stream, flush=True)
+    print(text, file=sys.stderr, flush=True)
+    for log in _logs:
+        with contextlib.suppress(OSError):  # a full disk must not hide what is said
+            log.write(f"{text}\n".encode())
 
 
-_logs: list[TextIO] = []
+_logs: list[BinaryIO] = []  # unbuffered, so that nothing is left to be written when they are closed
 
 
 @contextmanager
@@ -38,7 +40,7 @@ def one_line_errors(log: str) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         try:
             try:
-                _logs.append(stack.enter_context(open(log, "w")))
+                _logs.append(stack.enter_context(open(log, "wb", buffering=0)))
             except OSError as error:
                 raise InputError(f"{log}: cannot be written ({error.strerror})") from error
             yield

@@ -6,6 +6,7 @@ the file it leads, (phase, time).
 
 import contextlib
 import os
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,6 +29,7 @@ VARIABLES: dict[str, tuple[bool, str, bool, str]] = {
     "bus_voltage": (False, "V", False, "mean over the interval"),
 }
 MINIMUM_DURATION = 0.2  # s
+_FULL = 2**20  # bytes; a disk with less is a full one
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,9 @@ def replace_atomically(path: Path, write) -> None:
         os.replace(temporary, path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    except RuntimeError as error:  # how the netCDF library reports a full disk
-        raise InputError(f"{path}: cannot be written ({error})") from error
+    except RuntimeError as error:  # how the netCDF library reports a full disk, among other things
+        full = shutil.disk_usage(path.parent).free < _FULL
+        raise InputError(f"{path}: cannot be written ({'No space left on device' if full else error})") from error
     finally:
         with contextlib.suppress(OSError):  # nothing to remove where nothing could be written
             temporary.unlink(missing_ok=True)

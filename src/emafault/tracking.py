@@ -9,6 +9,7 @@ import fcntl
 import json
 import logging
 import os
+import re
 import subprocess
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -79,11 +80,23 @@ def log_run(uri: str, experiment: str, entry: Entry) -> str:
 
 
 def _log(client, experiment_id: str, entry: Entry, tags: Mapping[str, str]) -> str:
-    from mlflow.entities import Metric, Param
-
     now = int(1000 * time.time())
     every = {"mlflow.source.name": "emafault", "code_version": code_version(), **entry.tags, **tags}
     run = client.create_run(experiment_id, start_time=now, run_name=entry.name, tags=every).info.run_id
+    try:
+        _fill(client, experiment_id, run, entry, now)
+    except BaseException:
+        with contextlib.suppress(Exception):  # what broke the logging may break this too
+            client.set_terminated(run, "FAILED")
+        raise
+    client.set_terminated(run)
+    return run
+
+
+def _fill(client, experiment_id: str, run: str, entry: Entry, now: int) -> None:
+    """Log what an entry holds, then its children."""
+    from mlflow.entities import Metric, Param
+
     parameters = [Param(key, str(value)[:_LONGEST_VALUE]) for key, value in flatten(entry.parameters).items()]
     metrics = [Metric(_name(key), float(value), now, 0) for key, value in entry.metrics.items() if value == value]
     for key, values in entry.curves.items():
@@ -97,8 +110,6 @@ def _log(client, experiment_id: str, entry: Entry, tags: Mapping[str, str]) -> s
         log(run, str(path), folder or None)
     for child in entry.children:
         _log(client, experiment_id, child, {"mlflow.parentRunId": run})
-    client.set_terminated(run)
-    return run
 
 
 def _name(key: str) -> str:
@@ -124,10 +135,11 @@ def _experiment_id(client, uri: str, name: str) -> str:
 def _client(uri: str) -> Iterator[Any]:
     """A client, with the local database locked while it is open."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    for name in ("mlflow", "alembic"):
-        logging.getLogger(name).setLevel(logging.WARNING)
     from mlflow import MlflowClient
     from mlflow.exceptions import MlflowException
+
+    for name in ("mlflow", "alembic"):  # what goes wrong is raised too; the import sets levels of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
     with contextlib.ExitStack() as stack:
         try:
@@ -138,7 +150,8 @@ def _client(uri: str) -> Iterator[Any]:
                 fcntl.flock(lock, fcntl.LOCK_EX)
             yield MlflowClient(tracking_uri=uri)
         except (MlflowException, OSError) as error:
-            raise InputError(f"tracking.uri: {uri} cannot be used ({' '.join(str(error).split())[:300]})") from error
+            reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())
+            raise InputError(f"tracking.uri: {uri} cannot be used ({reason[:300]})") from error
 
 
 def read_tracked(path: str | Path) -> dict[str, Any]:

@@ -41,7 +41,9 @@ def test_jacobian_is_that_of_central_differences(activation, hidden):
 
 
 @pytest.mark.parametrize("hidden", [(5,), (4, 3)])
-def test_normal_equations_are_those_of_the_formed_jacobian(hidden):
+@pytest.mark.parametrize("block", [lm.BLOCK, 7])
+def test_normal_equations_are_those_of_the_formed_jacobian(hidden, block, monkeypatch):
+    monkeypatch.setattr(lm, "BLOCK", block)
     x, t, rng = problem()
     weights = lm.initialise((2, *hidden, 2), rng)
     J = lm.jacobian(weights, "tanh", x)

@@ -136,6 +136,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     for j in range(3):
         R[j] = R_winding[j] * (1.0 + p.copper_coefficient * p.dT) + R_outside[j]
     theta, w, moving = p.theta_0, 0.0, 0
+    cogging_sine, cogging_cosine = np.sin(COGGING_ORDER * theta), np.cos(COGGING_ORDER * theta)
     at_stop = 0
     shaft, w_shaft, contact = 0.0, 0.0, 0
     filtered = 0.0  # measured speed behind the latency
@@ -249,8 +250,8 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         drive = Kp * ip + Km * im + Ko * io
         drive_1 = Kp * y1p + Km * y1m + Ko * y1o + w * (dKp * ip + dKm * im + dKo * io)
         if p.cogging_a != 0.0:
-            drive -= p.cogging_a * np.sin(COGGING_ORDER * theta)
-            drive_1 -= p.cogging_a * COGGING_ORDER * w * np.cos(COGGING_ORDER * theta)
+            drive -= p.cogging_a * cogging_sine
+            drive_1 -= p.cogging_a * COGGING_ORDER * w * cogging_cosine
         load = p.load_constant_T + p.load_spring_c * shaft
         twist = twist_1 = shaft_torque = 0.0
         side = 0
@@ -442,6 +443,8 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         w_before = w
         w += h * (a + h * (0.5 * b + h * c / 6.0))
         theta += d_theta
+        if p.cogging_a != 0.0:  # not where it is used: calls up there cost a nominal run a tenth of its time
+            cogging_sine, cogging_cosine = np.sin(COGGING_ORDER * theta), np.cos(COGGING_ORDER * theta)
         if tau > 0.0 and h > 0.0:
             u0, u1 = p.speed_scale_scale * w_before, p.speed_scale_scale * w
             rise = (u1 - u0) / h

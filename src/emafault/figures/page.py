@@ -9,13 +9,14 @@ from pathlib import Path
 from ..recording import replace_atomically
 
 _STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f21; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f21; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
 p.lead { font-size: 1.08rem; } p.small, figcaption { color: #555; font-size: .9rem; }
 figure { margin: 1.2rem 0; } figure img { max-width: 100%; height: auto; }
 .scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: .92rem; margin: .8rem 0; }
-th, td { padding: .28rem .7rem; text-align: right; border-bottom: 1px solid #e3e3e3; white-space: nowrap; }
-th { border-bottom: 2px solid #888; } th:first-child, td:first-child { text-align: left; }
+th, td { padding: .28rem .5rem; text-align: right; border-bottom: 1px solid #e3e3e3; white-space: nowrap; }
+th { border-bottom: 2px solid #888; white-space: normal; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 9rem; }
 tr.strong td { font-weight: 600; } pre { background: #f6f6f4; padding: .8rem; overflow-x: auto; font-size: .82rem; }
 """
 

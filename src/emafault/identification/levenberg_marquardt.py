@@ -12,6 +12,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+BLOCK = 2000  # rows whose derivatives are in memory at a time
+
 #: activation and its derivative, both of the pre-activation
 ACTIVATIONS: dict[str, tuple[Callable, Callable]] = {
     "tanh": (np.tanh, lambda z: 1.0 - np.tanh(z) ** 2),
@@ -69,7 +71,16 @@ def jacobian(weights: Weights, activation: str, x: np.ndarray) -> np.ndarray:
 
 
 def normal_equations(weights: Weights, activation: str, x: np.ndarray, t: np.ndarray):
-    """J'J (weight, weight), J'e (weight,) and the sum of squares of e = y - t, without forming J."""
+    """J'J (weight, weight), J'e (weight,) and the sum of squares of e = y - t, without forming J, in blocks of rows."""
+    blocks = [slice(start, start + BLOCK) for start in range(0, len(x), BLOCK)]
+    JJ, Je, sse = _normal_equations(weights, activation, x[blocks[0]], t[blocks[0]])
+    for rows in blocks[1:]:
+        more = _normal_equations(weights, activation, x[rows], t[rows])
+        JJ, Je, sse = JJ + more[0], Je + more[1], sse + more[2]
+    return JJ, Je, sse
+
+
+def _normal_equations(weights: Weights, activation: str, x: np.ndarray, t: np.ndarray):
     inputs, deltas, y = _layers(weights, activation, x)
     e = y - t
     sizes = [W.size for W in weights]

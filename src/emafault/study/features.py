@@ -1,6 +1,6 @@
 """Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file; their Cramer-Rao bound."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from ..dataset import BLOCK, count_runs, read_blocks, sample_runs
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..progress import progress
-from ..reconstruction import Features, join_features, reconstruct
+from ..reconstruction import Features, reconstruct
 from ..recording import PHASES, replace_atomically
 
 _UNITS = {"R": "ohm", "k": "V s/rad", "L": "H", "offset": "V"}
@@ -40,7 +40,8 @@ class FeatureTable:
 
     def identified(self) -> "FeatureTable":
         """The runs whose records held enough to estimate all features."""
-        return self.rows(np.all(np.isfinite(self.inputs), axis=1))
+        known = np.all(np.isfinite(self.inputs), axis=1)
+        return self if np.all(known) else self.rows(known)
 
     def rows(self, rows: np.ndarray) -> "FeatureTable":
         """Some of the runs."""
@@ -63,46 +64,74 @@ def reconstruct_features(shards: Sequence[str], spec: Mapping[str, Any], output:
     """
     settings = dict(spec["settings"])
     method, actuator = settings.pop("method"), ActuatorParameters(**spec["actuator"])
-    parts, faults, ambient = [], [], []
-    blocks = progress(
-        read_blocks(shards, _SIGNALS), f"reconstruct {Path(output).stem}", -(-count_runs(shards) // BLOCK)
-    )
-    for block in blocks:
-        parts.append(reconstruct(method, block.signals, block.interval, actuator, settings))
-        faults.append(block.faults)
-        ambient.append(block.signals["ambient_temperature"])
-    write_features(output, FeatureTable(join_features(parts), np.concatenate(faults), np.concatenate(ambient)))
+    runs = count_runs(shards)
+
+    def tables() -> Iterator[FeatureTable]:
+        for block in progress(read_blocks(shards, _SIGNALS), f"reconstruct {Path(output).stem}", -(-runs // BLOCK)):
+            found = reconstruct(method, block.signals, block.interval, actuator, settings)
+            yield FeatureTable(found, block.faults, block.signals["ambient_temperature"])
+
+    write_features(output, tables(), runs)
 
 
-def write_features(path: str | Path, table: FeatureTable) -> None:
-    """Write a feature table as netCDF.
+def write_features(path: str | Path, tables: Iterable[FeatureTable], runs: int) -> None:
+    """Write tables of features one after the other into one netCDF file of ``runs`` runs; none is kept in memory.
 
     Raises
     ------
     InputError : the file cannot be written
     """
-    import xarray as xr
+    import netCDF4
 
+    def write(temporary: Path) -> None:
+        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+            first = 0
+            for table in tables:
+                values = _variables(table)
+                if not first:
+                    _create(file, values, runs)
+                for name, (_, array, _) in values.items():
+                    file[name][first : first + len(array)] = array
+                first += len(table.faults)
+
+    replace_atomically(Path(path), write)
+
+
+def _variables(table: FeatureTable) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+    """Name -> dimensions, values and attributes of everything that is kept of a table."""
     f = table.features
-    variables: dict[str, Any] = {
+    variables: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]] = {
         name: (("run", "phase"), getattr(f, name), {"units": unit}) for name, unit in _UNITS.items()
     }
     variables["covariance"] = (("run", "feature", "feature_"), f.covariance, {"long_name": "of R and k, SI"})
-    variables["fault"] = (("run", "component"), table.faults)
-    variables["ambient_temperature"] = ("run", table.ambient_temperature, {"units": "degC"})
+    variables["fault"] = (("run", "component"), table.faults, {})
+    variables["ambient_temperature"] = (("run",), table.ambient_temperature, {"units": "degC"})
     for name, values in f.extras.items():
-        variables[f"extra_{name}"] = (("run", *(f"{name}_{n}" for n in range(1, values.ndim))), values)
-    names = [f"{quantity}_{phase}" for quantity in "Rk" for phase in PHASES]
-    data = xr.Dataset(
-        variables,
-        {"phase": list(PHASES), "component": list(FAULT_NAMES), "feature": names, "feature_": names},
-        {"title": "reconstructed phase parameters", "Conventions": "CF-1.11"},
-    )
-    replace_atomically(Path(path), lambda temporary: data.to_netcdf(temporary, engine="netcdf4"))
+        if values.size:
+            variables[f"extra_{name}"] = (("run", *(f"{name}_{n}" for n in range(1, values.ndim))), values, {})
+    return variables
+
+
+def _create(file, variables: Mapping[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]], runs: int) -> None:
+    """Dimensions with their labels, variables and attributes of a file of features."""
+    features = [f"{quantity}_{phase}" for quantity in "Rk" for phase in PHASES]
+    labels = {"phase": PHASES, "component": FAULT_NAMES, "feature": features, "feature_": features}
+    file.setncatts({"title": "reconstructed phase parameters", "Conventions": "CF-1.11"})
+    file.createDimension("run", runs)
+    for name, words in labels.items():
+        file.createDimension(name, len(words))
+        variable = file.createVariable(name, str, (name,))
+        for j, word in enumerate(words):
+            variable[j] = word
+    for name, (dimensions, array, attributes) in variables.items():
+        for dimension, size in zip(dimensions, array.shape):
+            if dimension not in file.dimensions:
+                file.createDimension(dimension, size)
+        file.createVariable(name, array.dtype, dimensions, fill_value=False).setncatts(attributes)
 
 
 def read_features(path: str | Path) -> FeatureTable:
-    """Read what ``write_features`` wrote.
+    """Read what ``write_features`` wrote; of the extras only ``xi``, which is learnt from.
 
     Raises
     ------
@@ -114,10 +143,7 @@ def read_features(path: str | Path) -> FeatureTable:
         raise InputError(f"{path}: no such file")
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
-            data.load()
-            extras = {
-                str(n).removeprefix("extra_"): data[n].values for n in data.variables if str(n).startswith("extra_")
-            }
+            extras = {"xi": data["extra_xi"].values} if "extra_xi" in data.variables else {}
             R, k, L, offset, covariance = (data[n].values for n in (*_UNITS, "covariance"))
             features = Features(R, k, L, offset, covariance, extras)
             return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)

@@ -34,6 +34,8 @@ def track_evaluation(
 ) -> None:
     """Log one evaluation: configuration, metrics, learning curves, figures, report and model; trials as nested runs.
 
+    The metrics ``best.*`` are the mean absolute errors of the estimator that the tag ``best`` names.
+
     Parameters
     ----------
     spec : the whole resolved configuration
@@ -46,7 +48,8 @@ def track_evaluation(
     InputError : an address that cannot be used
     """
     table, server = read_json(metrics), read_json(where)
-    values: dict[str, float] = {}
+    best = min(table["results"], key=lambda entry: entry["all"]["errors.mean.over_range"]["mean"])
+    values = {f"best.{output}": best["all"][f"errors.{output}.mae"]["mean"] for output in ("dT", "N", "xi")}
     for entry in table["results"]:
         label = f"{entry['method']}.{entry['estimator']}"
         values[f"{label}.parameters"] = entry["parameters"]
@@ -78,7 +81,7 @@ def track_evaluation(
         parameters=spec,
         metrics=values,
         curves=curves,
-        tags={"experiment": name, "stage": "evaluation"},
+        tags={"experiment": name, "stage": "evaluation", "best": f"{best['method']}/{best['estimator']}"},
         files={path: folder for path, folder in {**files, **identifiers}.items() if Path(path).exists()},
         children=tuple(children),
     )

@@ -1,0 +1,35 @@
+"""Comparing reports: the page names the variant that identifies best."""
+
+import json
+
+import pytest
+
+from emafault.study.report import compare_variants
+
+
+def _metrics(path, closed_form, network, bound):
+    outputs = ("N", "xi", "dT")
+    results = [
+        {"method": "weighted", "estimator": estimator, "all": {f"errors.{o}.mae": {"mean": error} for o in outputs}}
+        for estimator, error in (("closed_form", closed_form), ("network", network))
+    ]
+    path.write_text(json.dumps({"results": results, "bound": {"floating": dict.fromkeys(outputs, bound)}}))
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "says"),
+    [
+        ((0.3, 0.1, 0.2), "of any estimator. N: sine (0.10000; the bound is lowest for sine, 0.10000)"),
+        ((0.1, 0.1, 0.1), "of any network, all being evaluated on the same recordings. N: runs 3 (0.20000; the first "),
+    ],
+)
+def test_the_best_variant_is_named(tmp_path, bounds, says):
+    same = len(set(bounds)) == 1
+    networks = (0.4, 0.205, 0.2) if same else [1.2 * bound for bound in bounds]
+    files = [_metrics(tmp_path / f"{n}.json", b, e, b) for n, (b, e) in enumerate(zip(bounds, networks))]
+    names = ["runs_1", "runs_2", "runs_3"] if same else ["ramp", "sine", "chirp"]
+    compare_variants("study", "Which?", names, files, tmp_path / "report.html", tmp_path / "figures")
+    text = (tmp_path / "report.html").read_text()
+    assert says in text
+    assert not same or "the first within 5 % of it is runs 2, 0.20500" in text
