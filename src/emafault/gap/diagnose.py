@@ -77,7 +77,8 @@ def diagnose(
     # from here on the confirm recordings are open
     ladder = climb(twin, confirm, problem, found.null, best) if confirm else None
     sealed, held_out = verdict["verdict"], None
-    if ladder is not None and best is not None:
+    # the recalibrated model has what a calibration effect names already: only what is structural can help beyond it
+    if ladder is not None and best is not None and any(by_id[e].kind != "calibration" for e in best.effects):
         held_out = held_out_features(ladder.recalibrated.rms, ladder.after.rms, len(ladder.problem.cells))
         decision = decide(problem, found, hypotheses, calibration, held_out)
         verdict["verdict"] = decision.verdict

@@ -76,7 +76,6 @@ class Problem:
         """Take the statistics' covariance at a parameter point; ``shy`` all but ignores erratic recordings."""
         cov = self.twin.covariance(values, self.part)
         erratic = getattr(self.twin, "erratic", lambda name: False)
-        shy = shy and not all(erratic(name) for name in self.rows)
         self._blocks = []
         for name, rows in self.rows.items():
             block = cov[np.ix_(rows, rows)]
@@ -263,28 +262,32 @@ class Problem:
         best, before = None, np.inf
         bounds = self.low.copy(), self.high.copy()
         unit = [m for m in self.nuisances if self.parameters[m].recordings is None]
+        erratic = getattr(self.twin, "erratic", lambda name: False)
+        # where the start is far off, only the smooth recordings lead the right way
+        shy = 2 if any(map(erratic, self.part)) and not all(map(erratic, self.part)) else 0
         for round_ in range(rounds):
             # the first steps are long: what belongs to the unit stays near its specification until they are done
             self.low, self.high = bounds[0].copy(), bounds[1].copy()
             if round_ == 0:
                 self.low[unit] = np.maximum(self.low[unit], self.mean[unit] - LEASH * self.sd[unit])
                 self.high[unit] = np.minimum(self.high[unit], self.mean[unit] + LEASH * self.sd[unit])
-            if round_ < 2:
+            if round_ < max(2, shy + 1):
                 if settle is not None:
                     settle(values, self.part)
-                # where the start is far off, only the smooth recordings lead the right way
-                self.set_covariance(values, shy=round_ == 0)
+                self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
             jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
             best = self.descend(self.point(values, prediction, jacobian, self.nuisances))
             shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
             values = best.values
             near = 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells)
-            if round_ == 1 and best.objective < len(self.cells) and shifted.max() < SETTLED:
+            if round_ < shy:
+                continue
+            if round_ == max(1, shy) and best.objective < len(self.cells) and shifted.max() < SETTLED:
                 break
-            if round_ > 1 and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
+            if round_ > max(1, shy) and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
                 break
-            before = best.objective if round_ > 0 else np.inf
+            before = best.objective if round_ >= max(1, shy) else np.inf
         assert best is not None
         return best
 

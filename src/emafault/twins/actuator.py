@@ -34,6 +34,7 @@ MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
+HUNTING = 4.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
 FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
@@ -353,7 +354,7 @@ class ActuatorTwin:
     def _compared(self, name: str, signals: dict) -> np.ndarray:
         """(statistic,) statistics of simulated signals as they compare with the recording's."""
         b = self._brought[name]
-        return compute(b.nominal, signals).on_ripple_of(b.computed.norm)
+        return compute(b.nominal, signals).over(b.computed.norm)
 
     # ---- noise
     def settle(self, values: np.ndarray, part: Sequence[str]) -> None:
@@ -457,7 +458,7 @@ class ActuatorTwin:
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            if b.jitter is None or b.settled <= 3:
+            if b.jitter is None or b.settled <= 4:
                 count = FIRST_REPEATS if first else JITTER_REPEATS
                 b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
             jitter = b.jitter
@@ -492,7 +493,9 @@ class ActuatorTwin:
             moved["theta_0"] += shift
             moved["hysteresis"] *= 1.0 + shift
             if len(b.jumps):
-                b.command = command + offset
+                # when within its interval a step came is known to a part of it only
+                part = float(np.clip(0.5 + offset / COMMAND_SCATTER * 0.3, 0.0, 1.0))
+                b.command = self._command(b.recording, b.jumps, part) + offset
             signals = self._simulate(name, moved)
             if len(b.jumps):
                 signals["commanded_position"] = signals["commanded_position"] + offset
@@ -501,7 +504,7 @@ class ActuatorTwin:
         variance = np.var(repeats, axis=0, ddof=1)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
             variance[alike] = 0.5 * (variance[alike] + variance[alike].mean(axis=0))
-        return variance * (1.0 + 2.0 / len(repeats))
+        return variance * (1.0 + 2.0 / len(repeats)) * (HUNTING if len(b.jumps) else 1.0)
 
     # ---- what the verdict says
     def report(

@@ -140,6 +140,7 @@ LATTICE = _SPEED + 4
 OSCILLATION = _POSITION + 5
 #: statistics of di/dt; how much of it the samples show depends on where they fall on the switching ripple
 RIPPLE = np.array([j * _PER_PHASE + m for j in range(3) for m in (3, 4, 16)])
+SPEED_BINS = np.array([_TORQUE + d * _PER_DIRECTION + 3 + b for d in (0, 1) for b in range(len(SPEED_EDGES) - 1)])
 _SPEEDS = np.array(SPEED_EDGES)
 _ORDER_LIST = np.array(ORDERS, float)
 _COS_AXIS, _SIN_AXIS = np.cos(AXIS), np.sin(AXIS)
@@ -264,7 +265,7 @@ def fill_statistics(
     y[:] = 0.0
     norm[:] = 1e-12
     count[:] = 0
-    power, cross, cross_power = np.zeros(y.shape[0]), np.zeros(3), np.zeros(3)
+    power, cross, cross_power, product = np.zeros(y.shape[0]), np.zeros(3), np.zeros(3), np.zeros(2)
     ramp = np.pi / 6.0
     w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
     speed_and_acceleration(theta, dt, w_all, acceleration, slow)
@@ -419,6 +420,8 @@ def fill_statistics(
             _put(_BUS, n, 1.0, r, y, norm, count, store)
             _put(_BUS + 1, n, level, r, y, norm, count, store)
             _put(_BUS + 2, n, drive * w, r, y, norm, count, store)
+            product[0] += level
+            product[1] += drive * w
         # ---- controller: measured pair current against the reference that the recorded inputs give
         w_ref = min(max(ratio * K_pos * (command[n] - shaft[n]), -w_max), w_max)
         error = w_ref - speed[n]
@@ -480,6 +483,14 @@ def fill_statistics(
             power[m + 1] += mean * (mean * power[m] - 2.0 * cross_power[j])
             if store.shape[0] > 0:
                 store[m + 1] -= mean * store[m]
+    if has_bus:
+        # current and power likewise, so that a supply that is merely another leaves its trace in the constant alone
+        for m in (_BUS + 1, _BUS + 2):
+            mean = product[m - _BUS - 1] / norm[_BUS]
+            y[m] -= mean * y[_BUS]
+            norm[m] = max(norm[m] - mean * product[m - _BUS - 1], 1e-3 * norm[m])
+            if store.shape[0] > 0:
+                store[m] -= mean * store[_BUS]
     for m in range(y.shape[0]):
         if norm[m] < WEAKEST_INSTRUMENT * power[m]:
             norm[m] = WEAKEST_INSTRUMENT * power[m]
@@ -518,10 +529,15 @@ class Computed:
     residual: np.ndarray
     regressors: np.ndarray
 
-    def on_ripple_of(self, norm: np.ndarray) -> np.ndarray:
-        """(statistic,) values with those of di/dt as slopes times the square root of another recording's norms."""
+    def over(self, norm: np.ndarray) -> np.ndarray:
+        """(statistic,) values with some as slopes times the square root of another recording's norms.
+
+        How many samples fall into a bin of speed, and how much ripple they show, differs between two runs of the same
+        physics; a mean and a slope do not.
+        """
         out = self.values.copy()
-        out[RIPPLE] *= np.sqrt(np.clip(norm[RIPPLE] / self.norm[RIPPLE], 0.0, 1e3))
+        for alike, most in ((RIPPLE, 1e3), (SPEED_BINS, 4.0)):
+            out[alike] *= np.sqrt(np.clip(norm[alike] / self.norm[alike], 1.0 / most, most))
         return out
 
 
