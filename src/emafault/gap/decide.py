@@ -21,6 +21,7 @@ DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration, and what machines without blind cases of their own are judged by
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
 CONTRADICTED = -0.05  # log10 of the share left on the confirm recordings from which a named set has not helped there
+AMPLE = 1000.0  # of log evidence or excess: what is more says no more
 WITHDRAWN = 0.2  # the most that is still believed of such a set
 
 
@@ -55,6 +56,11 @@ class Calibration:
         path.write_text(json.dumps(asdict(self), indent=2) + "\n")
 
 
+def saturating(x: float) -> float:
+    """log(1 + x) of what is positive, up to ``AMPLE``."""
+    return float(np.log1p(np.clip(x, 0.0, AMPLE)))
+
+
 @dataclass(frozen=True)
 class Evidence:
     """What the curves see of a search."""
@@ -68,17 +74,17 @@ class Evidence:
 
     def gap_features(self) -> np.ndarray:
         """(1, log gain, log null excess)."""
-        return np.array([1.0, np.log1p(max(self.gain, 0.0)), np.log1p(max(self.null_excess, 0.0))])
+        return np.array([1.0, saturating(self.gain), saturating(self.null_excess)])
 
     def right_features(self) -> np.ndarray:
         """(1, log gain, log excess left, log share left, log margin)."""
         return np.array(
             [
                 1.0,
-                np.log1p(max(self.gain, 0.0)),
-                np.log1p(max(self.excess, 0.0)),
+                saturating(self.gain),
+                saturating(self.excess),
                 np.log10(max(self.unexplained, 1e-5)),
-                np.log1p(max(self.margin, 0.0)),
+                saturating(self.margin),
             ]
         )
 

@@ -16,6 +16,7 @@ from .twin import Hypothesis, Twin
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
 SETTLED = 1.0  # prior standard deviations that a fit within the noise may still move for its derivatives to be kept
+CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predictions must differ
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -106,6 +107,16 @@ class Problem:
         """(point, parameter) -> (point, statistic)."""
         return self.twin.predict(np.atleast_2d(points), self.part)
 
+    def seen(self, difference: np.ndarray) -> np.ndarray:
+        """(..., statistic) differences of two predictions, zero where they are no larger than the twin's own scatter.
+
+        Derivatives made of scatter would feign information, as many times as there are statistics.
+        """
+        scatter = getattr(self.twin, "scatter", None)
+        if scatter is None:
+            return difference
+        return np.where(np.abs(difference) > CLEAR * np.sqrt(2.0 * scatter(self.part)), difference, 0.0)
+
     def nuisance_jacobian(
         self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int], exact: bool = True
     ) -> np.ndarray:
@@ -141,7 +152,7 @@ class Problem:
                 point[m] += step
                 steps[m] = step
             points.append(point)
-        differences = self.predict(np.array(points)) - prediction
+        differences = self.seen(self.predict(np.array(points)) - prediction)
         out = np.zeros((len(self.cells), len(asked)))
         column = {m: c for c, m in enumerate(asked)}
         for batch, difference in zip(batches, differences, strict=True):
@@ -364,14 +375,14 @@ class Problem:
             off = np.array([self.parameters[m].off for m in own])
             if first is None:
                 for c, at in partial:
-                    columns[:, c] = (predictions[at] - null.prediction) / (begin_at[c] - off[c])
+                    columns[:, c] = self.seen(predictions[at] - null.prediction) / (begin_at[c] - off[c])
                 out.append(self.linear(null, (h,), null.values, null.prediction, columns))
                 continue
             full = predictions[first]
             if len(own) == 1:
-                columns[:, 0] = (full - null.prediction) / (begin_at[0] - off[0])
+                columns[:, 0] = self.seen(full - null.prediction) / (begin_at[0] - off[0])
             for c, at in partial:
-                columns[:, c] = (full - predictions[at]) / (begin_at[c] - off[c])
+                columns[:, c] = self.seen(full - predictions[at]) / (begin_at[c] - off[c])
             begin = null.values.copy()
             begin[own] = begin_at
             out.append(self.linear(null, (h,), begin, full, columns))
@@ -452,7 +463,7 @@ class Problem:
             point[m] += step
             steps.append(step)
             points.append(point)
-        return (self.predict(np.array(points)) - at.prediction).T / np.array(steps)
+        return self.seen(self.predict(np.array(points)) - at.prediction).T / np.array(steps)
 
     def projected(self, null: Point, columns: np.ndarray) -> np.ndarray:
         """(I + J S J')^-1 x for whitened columns x: what of them the nuisances cannot take up."""

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..gap.bench import read_bench, split_bench
-from ..gap.decide import UNCALIBRATED, Calibration
+from ..gap.decide import UNCALIBRATED, Calibration, saturating
 from ..gap.diagnose import diagnose
 from ..recording import replace_atomically
 from ..twins.actuator import ActuatorTwin
@@ -115,7 +115,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         truth = set(key["case"]["effects"])
         distance = (key["detectability"] or {}).get("nominal", 0.0)
         e = verdict["evidence"]
-        gain, excess = np.log1p(max(e["gain"], 0.0)), np.log1p(max(e["null_excess"], 0.0))
+        gain, excess = saturating(e["gain"]), saturating(e["null_excess"])
         if not truth or distance >= 25.0:
             gap_rows.append([1.0, gain, excess])
             gap_truth.append(bool(truth))
@@ -127,8 +127,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         right = best == truth and not key["case"]["left_out"]
         held = e["held_out"] or [0.0, 0.0]
         unexplained = np.log10(max(e["unexplained"], 1e-5))
-        margin = np.log1p(max(e["margin"], 0.0))
-        right_rows.append([1.0, gain, np.log1p(max(e["excess"], 0.0)), unexplained, margin, *held])
+        right_rows.append([1.0, gain, saturating(e["excess"]), unexplained, saturating(e["margin"]), *held])
         right_truth.append(right)
     gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap))
     both = _logistic(np.array(right_rows), np.array(right_truth), np.array([*start.right, *start.confirm]))

@@ -484,6 +484,12 @@ class ActuatorTwin:
             at += len(block)
         return out
 
+    def scatter(self, part: Sequence[str]) -> np.ndarray:
+        """(statistic,) variance of a single prediction by where its switching falls."""
+        none = np.zeros(SIZE)
+        brought = [self._brought[name] for name in part]
+        return np.concatenate([(none if b.jitter is None else b.jitter)[b.usable] for b in brought])
+
     def _jitter(self, name: str, run: np.void, shifts: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         """(statistic,) variance over simulations of the same physics that switch at other instants."""
         b = self._brought[name]
