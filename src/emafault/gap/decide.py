@@ -20,9 +20,9 @@ from .which import Search, far_outside, groups
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration, and what machines without blind cases of their own are judged by
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
-CONTRADICTED = -0.05  # log10 of the share left on the confirm recordings from which a named set has not helped there
+MOST = 0.5  # share of the gap that a named set may leave, where it was fitted and on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more
-WITHDRAWN = 0.2  # the most that is still believed of such a set
+WITHDRAWN = 0.2  # the most that is believed of a set that leaves more
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def decide(
     if held_out is not None:
         odds += float(np.dot(calibration.confirm, held_out))
     p_right = _sigmoid(odds)
-    if held_out is not None and any(calibration.confirm) and held_out[1] > CONTRADICTED:
+    if evidence.unexplained > MOST or (held_out is not None and held_out[1] > np.log10(MOST)):
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()
