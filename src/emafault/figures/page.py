@@ -17,6 +17,7 @@ figure { margin: 1.2rem 0; } figure img { max-width: 100%; height: auto; }
 th, td { padding: .28rem .5rem; text-align: right; border-bottom: 1px solid #e3e3e3; white-space: nowrap; }
 th { border-bottom: 2px solid #888; white-space: normal; vertical-align: bottom; }
 th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 9rem; }
+td.words, th.words { text-align: left; } td.words { white-space: normal; max-width: 22rem; }
 tr.strong td { font-weight: 600; } pre { background: #f6f6f4; padding: .8rem; overflow-x: auto; font-size: .82rem; }
 """
 
@@ -42,11 +43,16 @@ class Page:
         self.parts.append(f"<pre>{html.escape(text)}</pre>")
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], strong: Sequence[int] = ()) -> None:
-        """A table of texts; rows numbered in ``strong`` are set off."""
-        head = "".join(f"<th>{html.escape(cell)}</th>" for cell in header)
+        """A table of texts; rows numbered in ``strong`` are set off, columns of words are set left and wrap."""
+        lettered = [
+            sum(any(c.isalpha() for c in row[n]) for row in rows if n < len(row)) > 0.5 * len(rows)
+            for n in range(len(header))
+        ]
+        kind = [" class=words" if words else "" for words in lettered]
+        head = "".join(f"<th{k}>{html.escape(cell)}</th>" for k, cell in zip(kind, header, strict=True))
         lines = []
         for n, row in enumerate(rows):
-            cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row)
+            cells = "".join(f"<td{k}>{html.escape(cell)}</td>" for k, cell in zip(kind, row, strict=False))
             lines.append(f"<tr{' class=strong' if n in strong else ''}>{cells}</tr>")
         self.parts.append(f'<div class="scroll"><table><tr>{head}</tr>{"".join(lines)}</table></div>')
 

@@ -111,11 +111,15 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
 
 
 def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarray | None:
-    """(1, log share left) of the confirm recordings' excess misfit; None where they show no gap beyond noise."""
-    visible = recalibrated**2 - 1.0
-    if visible < 4.0 * np.sqrt(2.0 / max(size, 1)) * max(recalibrated**2, 1.0):
+    """(1, log share left) of the confirm recordings' excess misfit; None where they show no gap beyond noise.
+
+    A gap that is not there before and there after the named set counts as seen.
+    """
+    threshold = 4.0 * np.sqrt(2.0 / max(size, 1)) * max(recalibrated**2, 1.0)
+    visible, left = recalibrated**2 - 1.0, after**2 - 1.0
+    if max(visible, left) < threshold:
         return None
-    return np.array([1.0, np.log10(np.clip(max(after**2 - 1.0, 0.0) / visible, 1e-3, 10.0))])
+    return np.array([1.0, np.log10(np.clip(max(left, 0.0) / max(visible, 0.25 * threshold), 1e-3, 10.0))])
 
 
 def _sigmoid(x: float) -> float:

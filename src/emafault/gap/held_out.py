@@ -65,6 +65,32 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     return {"outcome": outcome, "claimed": list(claimed), "rivals": listed}
 
 
+def claim(diagnosis: Diagnosis, outcome: dict) -> None:
+    """Let the confirm recordings decide what a verdict claims.
+
+    Where a rival holds much better there, the first entry of ``which`` becomes what it shares with the named set, with
+    that set's probability, the verdict ``partly``; the named set stays in second place. ``unknown`` if they share
+    nothing.
+    """
+    verdict = diagnosis.verdict
+    if outcome["outcome"] != "rival":
+        return
+    first, rest = verdict["which"][0], verdict["which"][1:]
+    claimed = list(outcome["claimed"])
+    same = [e for e in rest if sorted(e["effects"]) == sorted(claimed)]
+    if not claimed:
+        unknown = next(e for e in rest if e["effects"] == ["unknown"])
+        unknown["probability"], first["probability"] = first["probability"], unknown["probability"]
+        verdict["which"] = [unknown, first, *(e for e in rest if e is not unknown)]
+        verdict["verdict"] = "unknown"
+        return
+    parameters = {k: p for k, p in first.get("parameters", {}).items() if p.get("effect") in claimed}
+    entry = same[0] if same else {"effects": claimed, "probability": 0.0, "group": None, "parameters": parameters}
+    entry["probability"], first["probability"] = first["probability"], entry["probability"]
+    verdict["which"] = [entry, first, *(e for e in rest if e is not entry)]
+    verdict["verdict"] = "partly"
+
+
 def shared(sets: Sequence[Sequence[str]]) -> list[str]:
     """Effects that all sets have, in the order of the first."""
     return [e for e in sets[0] if all(e in other for other in sets[1:])]

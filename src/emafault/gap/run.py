@@ -140,7 +140,7 @@ def diagnose_recordings(
     from ..twins.actuator_features import feature_ladder
     from ..twins.actuator_pictures import worst_region
     from .handover import experiment_text
-    from .held_out import held_out
+    from .held_out import claim, held_out
     from .next_experiment import next_experiments
 
     for effect in exclude:
@@ -156,6 +156,7 @@ def diagnose_recordings(
     if not whole:
         return Diagnosed(found, truths)
     verdict["held_out"] = held_out(found, RIVALS)
+    claim(found, verdict["held_out"])
     verdict["shrinks"]["features"] = feature_ladder(found)
     verdict["next_experiment"] = next_experiments(found, actuator_experiments)
     named = verdict["verdict"] in ("explained", "group", "partly")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from emafault.gap.decide import Calibration
 from emafault.gap.diagnose import INTERVAL, Diagnosis, diagnose
-from emafault.gap.held_out import held_out
+from emafault.gap.held_out import claim, held_out
 from emafault.gap.where import equation_of
 from emafault.gap.which import confusability
 from emafault.twins.library import build_twin, distortions, read_cases
@@ -21,6 +21,7 @@ def diagnose_twin(twin: MeasuredTwin, calibration: Calibration) -> Diagnosis:
     """One case; the verdict gains ``held_out`` (what survives the confirm recordings) and ``notes``."""
     found = diagnose(twin, twin.case, twin.explore, twin.confirm, calibration)
     found.verdict["held_out"] = held_out(found)
+    claim(found, found.verdict["held_out"])
     found.verdict["notes"] = list(twin.notes)
     return found
 
