@@ -54,6 +54,61 @@ def test_statistics_are_as_many_as_specified_and_vanish_without_gap_or_noise():
     assert np.abs(found.values[plateau]).max() < 0.01  # V; the noise of one of them is about 0.05 V
 
 
+def signals_of(recording):
+    names = ["phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle"]
+    return {n: getattr(recording, n) for n in (*names, "output_position", "commanded_position", "bus_voltage")}
+
+
+def row(label, equation):
+    return next(m for m, s in enumerate(SPECIFICATION) if s[0] == label and s[1] == equation)
+
+
+def test_noise_of_the_current_leaves_no_bias_in_the_inductance():
+    silent = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
+    recording = bench({}, noise=silent)["1"]
+    nominal, signals = Nominal.of(ACTUATOR, recording, 1.4), signals_of(recording)
+    m = row("plateau L", "electrical_a")
+    clean = compute(nominal, signals).values[m]
+    rng = np.random.default_rng(0)
+    noisy = []
+    for _ in range(30):
+        current = signals["phase_current_end"] + 0.1 * rng.standard_normal(signals["phase_current_end"].shape)
+        noisy.append(compute(nominal, signals | {"phase_current_end": current}).values[m] - clean)
+    # the noise's own square, which a plain regression on di/dt would hold, is many times the scatter
+    assert abs(np.mean(noisy)) < 3.0 * np.std(noisy) / np.sqrt(len(noisy))
+
+
+def test_another_inductance_leaves_no_trace_in_the_saturation():
+    silent = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
+    changes = {}
+    for effect, values in (
+        ("inductance_tolerance", {"L_scale": 1.1}),
+        ("inductance_saturation", {"s": 0.03}),
+    ):
+        recording = bench({effect: values}, noise=silent, fault=(0.0,) * 5)["1"]
+        found = compute(Nominal.of(ACTUATOR, recording, 1.4), signals_of(recording))
+        changes[effect] = [abs(found.values[row(n, "electrical_a")]) for n in ("plateau L", "plateau i2 di")]
+    assert changes["inductance_tolerance"][1] < 0.05 * changes["inductance_tolerance"][0]
+    assert changes["inductance_saturation"][1] > 0.2 * changes["inductance_saturation"][0]
+
+
+def test_derivatives_no_larger_than_the_scatter_are_none():
+    class Scattering:
+        parameters, hypotheses = [], []
+
+        def cells(self, part):
+            return []
+
+        def observed(self, part):
+            return np.zeros(0)
+
+        def scatter(self, part):
+            return np.array([1.0, 1.0, 0.0])
+
+    problem = Problem(Scattering(), ["a"])
+    assert problem.seen(np.array([1.0, 10.0, 1e-9])).tolist() == [0.0, 10.0, 1e-9]
+
+
 def test_derived_derivatives_agree_with_differences():
     twin = ActuatorTwin(ACTUATOR, bench({}), NOISE, threads=1)
     problem = Problem(twin, twin.names)
