@@ -17,6 +17,8 @@ from .twin import Hypothesis, Twin
 NEAR = 20.0
 SETTLED = 1.0  # prior standard deviations that a fit within the noise may still move for its derivatives to be kept
 CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predictions must differ
+RENEWED = 4  # rounds in which they may be
+FAR = 2.0  # prior standard deviations that a round may move before noise and covariance are taken anew
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -270,35 +272,36 @@ class Problem:
         """Fit of the nuisances alone; calls the twin's ``settle`` (noise, start angle) where it has one."""
         values = np.array([p.off if p.effect else p.mean for p in self.parameters])
         settle = getattr(self.twin, "settle", None)
-        best, before = None, np.inf
+        best, before, far = None, np.inf, False
         bounds = self.low.copy(), self.high.copy()
         unit = [m for m in self.nuisances if self.parameters[m].recordings is None]
         erratic = getattr(self.twin, "erratic", lambda name: False)
         # where the start is far off, only the smooth recordings lead the right way
         shy = 2 if any(map(erratic, self.part)) and not all(map(erratic, self.part)) else 0
+        first = max(1, shy)  # round with all recordings in which the fit may end
         for round_ in range(rounds):
             # the first steps are long: what belongs to the unit stays near its specification until they are done
             self.low, self.high = bounds[0].copy(), bounds[1].copy()
             if round_ == 0:
                 self.low[unit] = np.maximum(self.low[unit], self.mean[unit] - LEASH * self.sd[unit])
                 self.high[unit] = np.minimum(self.high[unit], self.mean[unit] + LEASH * self.sd[unit])
-            if round_ < max(2, shy + 1):
+            if round_ <= first or far:
                 if settle is not None:
                     settle(values, self.part)
                 self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
             jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
             best = self.descend(self.point(values, prediction, jacobian, self.nuisances))
-            shifted = np.abs(best.values - values)[self.nuisances] / self.sd[self.nuisances]
-            values = best.values
-            near = 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells)
-            if round_ < shy:
+            shift = float((np.abs(best.values - values) / self.sd)[self.nuisances].max())
+            values, far = best.values, shift > FAR and round_ + 1 < RENEWED
+            if round_ < first or far:
                 continue
-            if round_ == max(1, shy) and best.objective < len(self.cells) and shifted.max() < SETTLED:
+            if round_ == first and best.objective < len(self.cells) and shift < SETTLED:
                 break
-            if round_ > max(1, shy) and (shifted.max() < 0.05 or (best.objective > (0.99 if near else 0.85) * before)):
+            least = 0.99 if 1.3 * len(self.cells) < best.objective < NEAR * len(self.cells) else 0.85
+            if round_ > first and (shift < 0.05 or best.objective > least * before):
                 break
-            before = best.objective if round_ >= max(1, shy) else np.inf
+            before = best.objective
         assert best is not None
         return best
 

@@ -458,10 +458,8 @@ class ActuatorTwin:
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
-            if b.jitter is None or b.settled <= 4:
-                count = FIRST_REPEATS if first else JITTER_REPEATS
-                b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
-            jitter = b.jitter
+            count = FIRST_REPEATS if first else JITTER_REPEATS
+            jitter = b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
             cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
             # the recording scatters once and the single simulation it is compared with once more

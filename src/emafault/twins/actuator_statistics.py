@@ -288,6 +288,8 @@ def fill_statistics(
         margin = span + MARGIN
         sum_i = i[n, 0] + i[n, 1] + i[n, 2]
         in_motion = abs(w) > REST_SPEED
+        # friction turns round at rest: a sample there must not count or not count by a little noise
+        weight = min(max(abs(w) / REST_SPEED - 1.0, 0.0), 1.0)
         level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
         cos_1, sin_1 = np.cos(middle), np.sin(middle)
         cos_p, sin_p = np.cos(poles * middle), np.sin(poles * middle)
@@ -389,27 +391,27 @@ def fill_statistics(
             r = drive - J * a - B * w - T_c * d
             residual[6, n] = r
             base = _TORQUE if d > 0.0 else _TORQUE + _PER_DIRECTION
-            _put(base, n, d, r, y, norm, count, store)
-            _put(base + 1, n, w, r, y, norm, count, store)
-            _put(base + 2, n, a_slow, r, y, norm, count, store)
+            _put(base, n, weight * d, r, y, norm, count, store)
+            _put(base + 1, n, weight * w, r, y, norm, count, store)
+            _put(base + 2, n, weight * a_slow, r, y, norm, count, store)
             for b in range(_SPEEDS.shape[0] - 1):
                 if _SPEEDS[b] <= abs(w) < _SPEEDS[b + 1]:
-                    _put(base + 3 + b, n, d, r, y, norm, count, store)
-            _put(_TORQUE_REST, n, shaft[n], r, y, norm, count, store)
-            _put(_TORQUE_REST + 1, n, drive, r, y, norm, count, store)
-            _put(_TORQUE_REST + 2, n, d * t, r, y, norm, count, store)
+                    _put(base + 3 + b, n, weight * d, r, y, norm, count, store)
+            _put(_TORQUE_REST, n, weight * shaft[n], r, y, norm, count, store)
+            _put(_TORQUE_REST + 1, n, weight * drive, r, y, norm, count, store)
+            _put(_TORQUE_REST + 2, n, weight * d * t, r, y, norm, count, store)
             for o in range(_ORDER_LIST.shape[0]):
                 reach = _ORDER_LIST[o] * abs(w) * dt
                 if reach < 2.0:
-                    _put(_ORDERS + 2 * o, n, turn_cos[o], r, y, norm, count, store)
-                    _put(_ORDERS + 2 * o + 1, n, turn_sin[o], r, y, norm, count, store)
+                    _put(_ORDERS + 2 * o, n, weight * turn_cos[o], r, y, norm, count, store)
+                    _put(_ORDERS + 2 * o + 1, n, weight * turn_sin[o], r, y, norm, count, store)
         # ---- play between the rotor and the user shaft
         r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
         residual[7, n] = r
         smooth_play += (r - smooth_play) * min(1.0, dt / 5.0e-3)
         play_power += (r - smooth_play) ** 2
         if in_motion:
-            _put(_POSITION + (0 if w > 0.0 else 1), n, 1.0, r, y, norm, count, store)
+            _put(_POSITION + (0 if w > 0.0 else 1), n, weight, r, y, norm, count, store)
         _put(_POSITION + 2, n, a_slow, r, y, norm, count, store)
         _put(_POSITION + 3, n, w, r, y, norm, count, store)
         _put(_POSITION + 4, n, drive, r, y, norm, count, store)
