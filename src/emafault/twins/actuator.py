@@ -173,10 +173,11 @@ class ActuatorTwin:
                 turns = component.startswith("N")
                 mean, sd = (0.0, HEALTHY_DEVIATION) if healthy else ((0.03, 0.05) if turns else (0.0, 0.1))
                 bound = 2e-3 if healthy else (0.3 if turns else 0.4)
+                step = 0.01 if healthy else (0.03 if turns else 0.06)
                 low = -bound if not turns or healthy else -0.002
                 out.append(
                     Parameter(
-                        f"{key}.{component}", "1", 0.0, mean, sd, low, bound, 0.01, None, tuple(members), component
+                        f"{key}.{component}", "1", 0.0, mean, sd, low, bound, step, None, tuple(members), component
                     )
                 )
         for name, b in self._brought.items():
