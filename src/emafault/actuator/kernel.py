@@ -14,6 +14,8 @@ from .friction import coulomb_torque, sliding_torque, static_limit
 from .motor import AXIS, MAX_CELLS, TWO_PI, angle_modulation, build_cells, is_modulated, phase_constants
 
 NEVER = 1.0e30
+LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment
+STALLED = 1000  # segments without progress in time, after which a run is given up
 MAX_SEGMENT = 5.0e-5  # s; short against L/R, so that four terms are enough
 CURRENT_TOLERANCE = 1.0e-9  # A
 BUS_FILTER = 1.0e-3  # s
@@ -153,7 +155,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     # ---- accumulators of the recording interval
     sum_i, sum_Ri, sum_e, start_flux = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     start_theta, start_filtered, sum_bus = theta, 0.0, 0.0
-    t, tick, record, segments = 0.0, 0, 0, 0
+    t, tick, record, segments, stalled = 0.0, 0, 0, 0, 0
     while record < records:
         # ---- control tick
         if t >= tick * tick_period - 1e-12:
@@ -246,6 +248,14 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             xp, xm, xo = vp - Kp * w - Rp * ip, vm - Km * w - Rm * im, vo - Ko * w - Ro * io
             star = (gammap * xp + gammam * xm + gammao * xo) * total
             y1p, y1m, y1o = gammap * (xp - star), gammam * (xm - star), gammao * (xo - star)
+        if saturation != 0.0:
+            # the inductance, and with it the time constant, must not change much within the segment
+            fastest = max(Rp * gammap, Rm * gammam, Ro * gammao)
+            fastest = max(fastest, 2.0 * saturation * abs(ip * y1p) / (1.0 + saturation * ip * ip))
+            fastest = max(fastest, 2.0 * saturation * abs(im * y1m) / (1.0 + saturation * im * im))
+            if h * fastest > LARGEST_CHANGE:
+                h = LARGEST_CHANGE / fastest
+                timed = False
         # ---- mechanics: driving torque, acceleration
         drive = Kp * ip + Km * im + Ko * io
         drive_1 = Kp * y1p + Km * y1m + Ko * y1o + w * (dKp * ip + dKm * im + dKo * io)
@@ -493,6 +503,12 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             shaft = min(max(shaft, -p.end_stop), p.end_stop)
         t = ends_at if timed else t + h
         segments += 1
+        if h < 1e-13 and not timed:
+            stalled += 1
+            if stalled > STALLED:
+                break
+        else:
+            stalled = 0
         # ---- recording instant
         if t >= (record + 1) * interval - 1e-12:
             mean_v = 0.0
@@ -513,6 +529,9 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             bus[record] = sum_bus / interval if sagging else p.bus_voltage_Vdc
             start_theta, start_filtered, sum_bus = theta, filtered, 0.0
             record += 1
+    for n in range(record, records):  # none, unless the parameters admit no motion that goes on
+        voltage[n], current[n], current_end[n] = np.nan, np.nan, np.nan
+        speed[n] = angle[n] = position[n] = bus[n] = np.nan
     return segments
 
 

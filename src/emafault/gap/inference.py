@@ -114,6 +114,7 @@ class Problem:
 
         Derivatives made of scatter would feign information, as many times as there are statistics.
         """
+        difference = np.where(np.isfinite(difference), difference, 0.0)  # of a run that could not be simulated
         scatter = getattr(self.twin, "scatter", None)
         if scatter is None:
             return difference
@@ -240,6 +241,8 @@ class Problem:
         residual = self.whiten(self.observed - prediction)
         misfit = float(residual @ residual)
         objective = misfit + float((((values[free] - mean) / sd) ** 2).sum())
+        if not np.isfinite(objective):
+            objective = np.inf
         scaled = self.whiten(jacobian) * sd
         information = np.eye(len(free)) + scaled.T @ scaled
         _, logdet = np.linalg.slogdet(information)
