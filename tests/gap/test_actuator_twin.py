@@ -121,10 +121,11 @@ def test_derived_derivatives_agree_with_differences():
         moved[m] += step
         difference = (problem.predict(moved)[0] - prediction) / step
         column = exact[:, problem.nuisances.index(m)]
-        # single differences scatter with the switching: the direction and the size must agree
+        # single differences scatter with the switching, and a fault's steps are as wide as its prior: the direction and
+        # the size must agree
         cosine = column @ difference / np.linalg.norm(column) / np.linalg.norm(difference)
-        assert cosine > 0.98
-        assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
+        assert cosine > 0.95
+        assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.1)
 
 
 @pytest.mark.parametrize(
