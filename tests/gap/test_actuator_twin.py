@@ -125,7 +125,7 @@ def test_derived_derivatives_agree_with_differences():
         # the size must agree
         cosine = column @ difference / np.linalg.norm(column) / np.linalg.norm(difference)
         assert cosine > 0.95
-        assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.1)
+        assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
 
 
 @pytest.mark.parametrize(

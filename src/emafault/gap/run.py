@@ -122,6 +122,7 @@ def diagnose_recordings(
     exclude: Sequence[str] = (),
     calibration: Calibration | None = None,
     whole: bool = True,
+    threads: int = THREADS,
 ) -> Diagnosed:
     """Diagnose a bench that has been read and checked.
 
@@ -129,6 +130,7 @@ def diagnose_recordings(
     ----------
     noise : of the sensors, where the recordings do not tell it
     calibration : frozen curves of probability; None takes those of the project
+    threads : simulations run side by side
     whole : with the ladder in features, the next experiments and the pictures; a withheld check needs none of them
 
     Raises
@@ -149,7 +151,7 @@ def diagnose_recordings(
     recordings = bench.recordings
     explore, confirm = split_bench(recordings)
     truths = {n: r.fault for n, r in recordings.items() if r.fault is not None}
-    twin: Any = ActuatorTwin(actuator, recordings, noise, tuple(exclude), THREADS)
+    twin: Any = ActuatorTwin(actuator, recordings, noise, tuple(exclude), threads)
     found = diagnose(twin, bench.name, explore, confirm, calibration or Calibration.load(), truths)
     verdict = found.verdict
     verdict["warnings"] = bench.warnings

@@ -15,11 +15,10 @@ from scipy.optimize import minimize
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..gap.bench import read_bench, split_bench
+from ..gap.bench import read_bench
 from ..gap.decide import UNCALIBRATED, Calibration, saturating
-from ..gap.diagnose import diagnose
+from ..gap.run import diagnose_recordings
 from ..recording import replace_atomically
-from ..twins.actuator import ActuatorTwin
 from ..withheld.benches import make_cases
 from ..withheld.cases import draw_case
 
@@ -99,9 +98,7 @@ def diagnose_bench(
 ) -> dict:
     """The verdict on a bench by the reference actuator's twin, without report or next experiment."""
     brought = read_bench(bench, actuator)
-    explore, confirm = split_bench(brought.recordings)
-    twin = ActuatorTwin(actuator, brought.recordings, noise, exclude, threads)
-    return diagnose(twin, brought.name, explore, confirm, calibration).verdict
+    return diagnose_recordings(brought, actuator, noise, exclude, calibration, whole=False, threads=threads).verdict
 
 
 def calibrate(folder: Path, start: Calibration) -> Calibration:

@@ -450,7 +450,6 @@ class ActuatorTwin:
 
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
-        blocks = []
         first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
         rng = np.random.default_rng(2)
         shifts = {name: START_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
