@@ -16,6 +16,7 @@ from .motor import AXIS, MAX_CELLS, TWO_PI, angle_modulation, build_cells, is_mo
 NEVER = 1.0e30
 LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment
 STALLED = 1000  # segments without progress in time, after which a run is given up
+FLOATING = 0.5  # of the supply; below it the three back-EMFs together bring no floating terminal to a rail
 MAX_SEGMENT = 5.0e-5  # s; short against L/R, so that four terms are enough
 CURRENT_TOLERANCE = 1.0e-9  # A
 BUS_FILTER = 1.0e-3  # s
@@ -84,6 +85,86 @@ def linkage(L, s, i):
 
 
 @compiled
+def conduct_pair(
+    i, w, into, high, duration, centre, band, V, R, inverse_L, K_0, dK, poles, torque, viscous, inverse_inertia, moving,
+    limit_forward, limit_backward, ahead,
+):  # fmt: skip
+    """Two phases in series on the supply, switched by the comparator, until something else happens.
+
+    Of ``run_actuator`` this is what a run does most of the time, without the terms that are zero then.
+
+    Parameters
+    ----------
+    i, w, into : current (A), speed (rad/s), electrical angle past the edge of the cell (rad)
+    high : whether the pair is on +V
+    duration : how far to go (s)
+    centre, band : of the comparator, in terms of the current (A)
+    V, R, inverse_L : supply (V), resistance (ohm) and 1/inductance (1/H) of the loop
+    K_0, dK : back-EMF coefficient of the loop at the edge (V s/rad) and its slope by the electrical angle
+    torque, viscous : load and, in motion, friction (N m), constant and by speed (N m s/rad)
+    inverse_inertia : 1/(kg m2), 0 at rest
+    moving, ahead : direction of motion or 0, length of the cell (electrical rad)
+    limit_forward, limit_backward : torque that friction holds at rest (N m)
+
+    Returns
+    -------
+    number of segments, time gone (s; less than ``duration`` where the next segment would leave the cell, come to
+    rest or break away), current, speed, angle past the edge, integral of the current (A s), whether the pair is on +V
+    """
+    t, area, segments = 0.0, 0.0, 0
+    slope = dK * poles
+    top, bottom = centre + band, centre - band
+    if high and i >= top - CURRENT_TOLERANCE:
+        high = False
+    elif not high and i <= bottom + CURRENT_TOLERANCE:
+        high = True
+    while True:
+        h = duration - t
+        last = h <= MAX_SEGMENT
+        if not last:
+            h = MAX_SEGMENT
+        K = K_0 + dK * into
+        y1 = ((V if high else -V) - K * w - R * i) * inverse_L
+        a = (K * i - viscous * w - torque) * inverse_inertia
+        b = (K * y1 + w * slope * i - viscous * a) * inverse_inertia
+        y2 = (-slope * w * w - K * a - R * y1) * inverse_L
+        c = (K * y2 + slope * (2.0 * w * y1 + a * i) - viscous * b) * inverse_inertia
+        y3 = (-3.0 * slope * w * a - K * b - R * y2) * inverse_L
+        y4 = -R * y3 * inverse_L
+        y2, y3, y4 = y2 / 2.0, y3 / 6.0, y4 / 24.0
+        off = i - (top if high else bottom)
+        tripped = off * (off + h * (y1 + h * (y2 + h * (y3 + h * y4)))) < 0.0
+        if tripped:
+            inverse = 1.0 / y1
+            u, q = -off * inverse, y2 * inverse
+            u *= 1.0 - u * (q - u * (2.0 * q * q - y3 * inverse))
+            rate = y1 + u * (2.0 * y2 + u * (3.0 * y3 + u * 4.0 * y4))
+            step = (off + u * (y1 + u * (y2 + u * (y3 + u * y4)))) / rate
+            u -= step
+            # one step of Newton from the reversed series leaves less than rounding, but where the current turns round
+            if not (abs(step) <= 1e-5 * u and u <= h):
+                u = crossing(off, y1, y2, y3, y4, h)
+            h = u
+        turned = poles * h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
+        faster = w + h * (a + h * (0.5 * b + h * c / 6.0))
+        end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
+        if moving != 0:
+            if moving * faster <= 0.0 or into + turned >= ahead or into + turned <= 0.0:
+                return segments, t, i, w, into, area, high
+        elif max(K * i, K * end) - torque > limit_forward or torque - min(K * i, K * end) > limit_backward:
+            return segments, t, i, w, into, area, high
+        area += h * (i + h * (y1 * 0.5 + h * (y2 / 3.0 + h * (y3 * 0.25 + h * y4 * 0.2))))
+        i = end
+        w, into = faster, into + turned
+        segments += 1
+        if tripped:
+            high = not high
+        elif last:
+            return segments, duration, i, w, into, area, high
+        t += h
+
+
+@compiled
 def run_actuator(p, command, interval, voltage, current, current_end, speed, angle, position, bus):
     """Simulate one run and fill its recorded signals.
 
@@ -119,6 +200,9 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     tau = p.speed_latency_tau
     poles = p.pole_pairs
     ratio = p.gear_ratio
+    plain = not (modulated or heated or compliant or sagging) and saturation == 0.0 and tau <= 0.0
+    plain = plain and p.cogging_a == 0.0 and p.stribeck_a == 0.0 and p.load_spring_c == 0.0
+    free_travel = 0.9 * p.end_stop * ratio
     inertia = p.inertia * p.inertia_scale
     shaft_inertia = (1.0 - MOTOR_SHARE) * inertia * ratio * ratio
     if compliant:
@@ -155,8 +239,30 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     # ---- accumulators of the recording interval
     sum_i, sum_Ri, sum_e, start_flux = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     start_theta, start_filtered, sum_bus = theta, 0.0, 0.0
-    t, tick, record, segments, stalled = 0.0, 0, 0, 0, 0
-    while record < records:
+    t, tick, record, segments, stalled, stopped_short = 0.0, 0, 0, 0, 0, False
+    while True:
+        # ---- recording instant
+        if t >= (record + 1) * interval - 1e-12:
+            mean_v = 0.0
+            for j in range(3):
+                flux = linkage(L[j], saturation, i[j])
+                voltage[record, j] = gain_v[j] * (sum_Ri[j] + flux - start_flux[j] + sum_e[j]) / interval
+                mean_v += voltage[record, j] / 3.0
+                current[record, j] = gain_i[j] * sum_i[j] / interval + offset_i[j]
+                current_end[record, j] = gain_i[j] * i[j] + offset_i[j]
+                start_flux[j] = flux
+                sum_i[j] = sum_Ri[j] = sum_e[j] = 0.0
+            if p.virtual_neutral_on != 0.0:
+                for j in range(3):
+                    voltage[record, j] -= mean_v
+            speed[record] = (p.speed_scale_scale * (theta - start_theta) - tau * (filtered - start_filtered)) / interval
+            angle[record] = theta + np.deg2rad(p.angle_offset_offset) / poles
+            position[record] = shaft
+            bus[record] = sum_bus / interval if sagging else p.bus_voltage_Vdc
+            start_theta, start_filtered, sum_bus = theta, filtered, 0.0
+            record += 1
+            if record == records:
+                break
         # ---- control tick
         if t >= tick * tick_period - 1e-12:
             measured = filtered if tau > 0.0 else p.speed_scale_scale * w
@@ -189,6 +295,56 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 elif pending_time[slot] < ends_at:
                     ends_at = pending_time[slot]
                     h = ends_at - t
+        free = diode == 0 and at_stop == 0 and i[3 - pair[cell, 0] - pair[cell, 1]] == 0.0
+        slow = abs(w) * largest_k < FLOATING * supply and abs(theta - p.theta_0) < free_travel
+        if plain and free and slow and not stopped_short:
+            # ---- most of the time two phases conduct and the comparator is all that happens until the next instant
+            plus, minus = pair[cell, 0], pair[cell, 1]
+            off = 3 - plus - minus
+            gain = 0.5 * (gain_i[plus] + gain_i[minus])
+            centre = (I_ref - 0.5 * (offset_i[plus] - offset_i[minus])) / gain
+            dK = k[plus] * slope[cell, plus] - k[minus] * slope[cell, minus]
+            into = poles * theta - turns * TWO_PI - edge[cell]
+            upper = edge[cell + 1] if cell + 1 < cells else edge[0] + TWO_PI
+            held = moving * (coulomb_forward if moving > 0 else coulomb_backward)
+            count, elapsed, end_p, w, later, area_p, high = conduct_pair(
+                i[plus],
+                w,
+                into,
+                high,
+                h,
+                centre,
+                band / gain,
+                supply,
+                R[plus] + R[minus] + 2.0 * drop,
+                inverse_L_pair[off],
+                k[plus] * value[cell, plus] - k[minus] * value[cell, minus],
+                dK,
+                poles,
+                p.load_constant_T / ratio + held,
+                viscous,
+                inverse_inertia if moving != 0 else 0.0,
+                moving,
+                limit_forward,
+                limit_backward,
+                upper - edge[cell],
+            )
+            d_theta = (later - into) / poles
+            for j in range(3):
+                sum_e[j] += k[j] * (value[cell, j] + 0.5 * slope[cell, j] * (into + later)) * d_theta
+            i[plus], i[minus] = end_p, -end_p
+            sum_i[plus] += area_p
+            sum_i[minus] -= area_p
+            sum_Ri[plus] += R[plus] * area_p
+            sum_Ri[minus] -= R[minus] * area_p
+            theta += d_theta
+            reach = (theta - p.theta_0) / ratio
+            shaft = min(max(shaft, reach - half_play), reach + half_play)
+            stopped_short = elapsed < h
+            t = t + elapsed if stopped_short else ends_at
+            segments += count
+            continue
+        stopped_short = False
         timed = True
         if h > MAX_SEGMENT:
             h = MAX_SEGMENT
@@ -223,7 +379,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         Kp, Km, Ko = kp * Kp, km * Km, ko * Ko
         dKp, dKm, dKo = kp * dKp, km * dKm, ko * dKo
         # ---- star network: which phases conduct, first derivatives of the currents
-        if diode == 0 and not keep_floating and abs(w) * largest_k > 0.15 * V:
+        if diode == 0 and not keep_floating and abs(w) * largest_k >= FLOATING * V:
             star = 0.5 * (vp + vm - (Kp + Km) * w)
             if saturation == 0.0:
                 xp, xm = vp - Kp * w - Rp * ip, vm - Km * w - Rm * im
@@ -401,7 +557,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 elif gap_1 > 0.0:
                     contact = side
                     continue
-        if diode == 0 and abs(w) * largest_k > 0.15 * V:
+        if diode == 0 and abs(w) * largest_k >= FLOATING * V:
             # a floating terminal may reach a rail inside the segment: its drift is slow, one secant is exact enough
             later = w + a * h
             was = (Ko - 0.5 * (Kp + Km)) * w
@@ -509,26 +665,6 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 break
         else:
             stalled = 0
-        # ---- recording instant
-        if t >= (record + 1) * interval - 1e-12:
-            mean_v = 0.0
-            for j in range(3):
-                flux = linkage(L[j], saturation, i[j])
-                voltage[record, j] = gain_v[j] * (sum_Ri[j] + flux - start_flux[j] + sum_e[j]) / interval
-                mean_v += voltage[record, j] / 3.0
-                current[record, j] = gain_i[j] * sum_i[j] / interval + offset_i[j]
-                current_end[record, j] = gain_i[j] * i[j] + offset_i[j]
-                start_flux[j] = flux
-                sum_i[j] = sum_Ri[j] = sum_e[j] = 0.0
-            if p.virtual_neutral_on != 0.0:
-                for j in range(3):
-                    voltage[record, j] -= mean_v
-            speed[record] = (p.speed_scale_scale * (theta - start_theta) - tau * (filtered - start_filtered)) / interval
-            angle[record] = theta + np.deg2rad(p.angle_offset_offset) / poles
-            position[record] = shaft
-            bus[record] = sum_bus / interval if sagging else p.bus_voltage_Vdc
-            start_theta, start_filtered, sum_bus = theta, filtered, 0.0
-            record += 1
     for n in range(record, records):  # none, unless the parameters admit no motion that goes on
         voltage[n], current[n], current_end[n] = np.nan, np.nan, np.nan
         speed[n] = angle[n] = position[n] = bus[n] = np.nan

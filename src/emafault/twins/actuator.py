@@ -14,7 +14,7 @@ from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
 from ..gap.twin import INTERVAL, Cell, Hypothesis, Parameter
 from ..recording import Recording
-from .actuator_noise import CHANNELS, channel_spread, noise_covariance
+from .actuator_noise import CHANNELS, channel_spread, covariance_by_channel, noise_covariance
 from .actuator_statistics import (
     _COMMUTATION,
     _PER_PHASE,
@@ -86,6 +86,7 @@ class _Brought:
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]
     theta_0: float
+    by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     settled: int = 0  # how often noise has been taken
 
@@ -460,7 +461,9 @@ class ActuatorTwin:
             run = self._runs(values[None, :], name)[0]
             count = FIRST_REPEATS if first else JITTER_REPEATS
             jitter = b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
-            cov = noise_covariance(b.nominal, b.signals, b.computed, b.noise)
+            if b.by_channel is None:
+                b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
+            cov = noise_covariance(b.by_channel, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
             # the recording scatters once and the single simulation it is compared with once more
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])

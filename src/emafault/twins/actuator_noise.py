@@ -123,8 +123,16 @@ def _f(x: np.ndarray) -> np.ndarray:
     return np.clip(np.arcsin(np.sin(x)) / (np.pi / 6.0), -1.0, 1.0)
 
 
-def noise_covariance(nominal: Nominal, signals: dict, computed: Computed, noise: dict[str, float]) -> np.ndarray:
+def noise_covariance(by_channel: dict[str, np.ndarray], noise: dict[str, float]) -> np.ndarray:
     """(statistic, statistic) covariance of one recording's statistics under independent noise of its channels."""
+    cov = sum(noise[channel] ** 2 * share for channel, share in by_channel.items())
+    assert isinstance(cov, np.ndarray)
+    cov[LATTICE, LATTICE] = LATTICE_DEVIATION**2
+    return cov
+
+
+def covariance_by_channel(nominal: Nominal, signals: dict, computed: Computed) -> dict[str, np.ndarray]:
+    """Channel -> (statistic, statistic) covariance of one recording's statistics under unit noise of that channel."""
     c, dt = nominal.constants, nominal.interval
     R, L, k, poles, J, B, ratio, K_pos, K_p = c[0], c[1], c[2], c[3], c[4], c[5], c[7], c[10], c[11]
     phi = computed.regressors / np.sqrt(computed.norm)[:, None]
@@ -133,10 +141,10 @@ def noise_covariance(nominal: Nominal, signals: dict, computed: Computed, noise:
     middle = theta.copy()
     middle[1:] = 0.5 * (theta[1:] + theta[:-1])
     f = _f((poles * middle[:, None] - AXIS) % TWO_PI)
-    cov = np.zeros((SIZE, SIZE))
+    by_channel = {channel: np.zeros((SIZE, SIZE)) for channel in CHANNELS}
 
-    def add(rows: np.ndarray, weights: np.ndarray, deviation: float) -> None:
-        cov[np.ix_(rows, rows)] += deviation**2 * (weights @ weights.T)
+    def add(rows: np.ndarray, weights: np.ndarray, channel: str) -> None:
+        by_channel[channel][np.ix_(rows, rows)] += weights @ weights.T
 
     def ends(weights: np.ndarray) -> np.ndarray:
         """Weights of di/dt on the currents it is formed from."""
@@ -162,7 +170,7 @@ def noise_covariance(nominal: Nominal, signals: dict, computed: Computed, noise:
     for j in range(3):
         own = np.arange(j * _PER_PHASE, (j + 1) * _PER_PHASE)
         electrical = np.concatenate([own, sums_v])
-        add(electrical, phi[electrical], noise["voltage"])
+        add(electrical, phi[electrical], "voltage")
         floating_only = np.array([m for m in sums_i if m < _SUM_I + 4 or m == _SUM_I + 4 + j])
         share = shares[4 * j : 4 * j + 4]
         rows = np.concatenate([electrical, floating_only, torque, share])
@@ -171,20 +179,20 @@ def noise_covariance(nominal: Nominal, signals: dict, computed: Computed, noise:
         )
         if not nominal.has_end:
             weights[: len(electrical)] += ends(-L * phi[electrical])
-        add(rows, weights, noise["current"])
+        add(rows, weights, "current")
         if nominal.has_end:
-            add(electrical, ends(-L * phi[electrical]), noise["current_end"])
+            add(electrical, ends(-L * phi[electrical]), "current_end")
     control = np.arange(_CONTROL, _COMMUTATION)
     lag = int(max(1.0, round(0.01 / dt)))
     demand = np.zeros((len(control), n))
     demand[:, :-1] -= K_p * phi[control][:, 1:]
     demand[:, : n - lag - 1] += K_p * phi[control][:, lag + 1 :]
-    add(np.concatenate([speeds, control]), np.concatenate([phi[speeds], -demand]), noise["speed"])
+    add(np.concatenate([speeds, control]), np.concatenate([phi[speeds], -demand]), "speed")
     position = np.arange(_POSITION, OSCILLATION)
     add(
         np.concatenate([position, control]),
         np.concatenate([phi[position], -ratio * K_pos * demand]),
-        noise["position"],
+        "position",
     )
     # the angle enters through speed and acceleration
     rows = np.concatenate([np.arange(3 * _PER_PHASE), sums_v, torque])
@@ -198,10 +206,9 @@ def noise_covariance(nominal: Nominal, signals: dict, computed: Computed, noise:
     step = -difference
     step[:, :-1] += difference[:, 1:]
     rows = np.concatenate([rows, speeds, position])
-    add(rows, np.concatenate([weights, step, -phi[position] / ratio]), noise["angle"])
+    add(rows, np.concatenate([weights, step, -phi[position] / ratio]), "angle")
     if nominal.has_bus:
         buses = np.arange(_BUS, _BUS + 3)
-        add(buses, phi[buses], noise["bus_voltage"])
-    cov[LATTICE, LATTICE] = LATTICE_DEVIATION**2
-    cov[OSCILLATION, OSCILLATION] = noise["position"] ** 2 / n
-    return cov
+        add(buses, phi[buses], "bus_voltage")
+    by_channel["position"][OSCILLATION, OSCILLATION] = 1.0 / n
+    return by_channel
