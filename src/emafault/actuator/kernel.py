@@ -11,11 +11,12 @@ import numpy as np
 
 from .compiled import compiled
 from .friction import coulomb_torque, sliding_torque, static_limit
-from .motor import AXIS, MAX_CELLS, TWO_PI, angle_modulation, build_cells, is_modulated, phase_constants
+from .motor import AXIS, MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 
 NEVER = 1.0e30
 LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment
 STALLED = 1000  # segments without progress in time, after which a run is given up
+FINE = 0.1  # rad of the fastest harmonic, over which a coefficient follows three terms
 FLOATING = 0.5  # of the supply; below it the three back-EMFs together bring no floating terminal to a rail
 MAX_SEGMENT = 5.0e-5  # s; short against L/R, so that four terms are enough
 CURRENT_TOLERANCE = 1.0e-9  # A
@@ -59,16 +60,6 @@ def crossing(c0, c1, c2, c3, c4, h):
 
 
 @compiled
-def modulate(p, theta, j, f, df):
-    """Add the shape's harmonics and the angle modulation of phase j to the trapezoid f and its derivative by theta."""
-    x = p.pole_pairs * theta - AXIS[j]
-    f += p.back_emf_shape_h5 * np.sin(5.0 * x) + p.back_emf_shape_h7 * np.sin(7.0 * x)
-    df += p.pole_pairs * (5.0 * p.back_emf_shape_h5 * np.cos(5.0 * x) + 7.0 * p.back_emf_shape_h7 * np.cos(7.0 * x))
-    g, dg = angle_modulation(p, theta, j)
-    return f * g, df * g + f * dg
-
-
-@compiled
 def mean_square(start, end, mean):
     """Mean square of a current over a segment from its ends and mean (exact for a parabola up to its bow squared)."""
     middle = 1.5 * mean - 0.25 * (start + end)
@@ -86,8 +77,8 @@ def linkage(L, s, i):
 
 @compiled
 def conduct_pair(
-    i, w, into, high, duration, centre, band, V, R, inverse_L, K_0, dK, poles, torque, viscous, inverse_inertia, moving,
-    limit_forward, limit_backward, ahead,
+    i, w, high, duration, centre, band, V, R, inverse_L, K_0, dK, ddK, torque, viscous, inverse_inertia, moving,
+    limit_forward, limit_backward, lower, upper,
 ):  # fmt: skip
     """Two phases in series on the supply, switched by the comparator, until something else happens.
 
@@ -95,24 +86,23 @@ def conduct_pair(
 
     Parameters
     ----------
-    i, w, into : current (A), speed (rad/s), electrical angle past the edge of the cell (rad)
-    high : whether the pair is on +V
+    i, w, high : current (A), speed (rad/s), whether the pair is on +V
     duration : how far to go (s)
     centre, band : of the comparator, in terms of the current (A)
     V, R, inverse_L : supply (V), resistance (ohm) and 1/inductance (1/H) of the loop
-    K_0, dK : back-EMF coefficient of the loop at the edge (V s/rad) and its slope by the electrical angle
+    K_0, dK, ddK : back-EMF coefficient of the loop (V s/rad) and its derivatives by the angle
     torque, viscous : load and, in motion, friction (N m), constant and by speed (N m s/rad)
     inverse_inertia : 1/(kg m2), 0 at rest
-    moving, ahead : direction of motion or 0, length of the cell (electrical rad)
+    moving : direction of motion or 0
     limit_forward, limit_backward : torque that friction holds at rest (N m)
+    lower, upper : edges of the cell from where the rotor is (rad)
 
     Returns
     -------
     number of segments, time gone (s; less than ``duration`` where the next segment would leave the cell, come to
-    rest or break away), current, speed, angle past the edge, integral of the current (A s), whether the pair is on +V
+    rest or break away), current, speed, angle gone (rad), integral of the current (A s), whether the pair is on +V
     """
-    t, area, segments = 0.0, 0.0, 0
-    slope = dK * poles
+    t, area, gone, segments = 0.0, 0.0, 0.0, 0
     top, bottom = centre + band, centre - band
     if high and i >= top - CURRENT_TOLERANCE:
         high = False
@@ -123,7 +113,7 @@ def conduct_pair(
         last = h <= MAX_SEGMENT
         if not last:
             h = MAX_SEGMENT
-        K = K_0 + dK * into
+        K, slope = K_0 + gone * (dK + 0.5 * gone * ddK), dK + gone * ddK
         y1 = ((V if high else -V) - K * w - R * i) * inverse_L
         a = (K * i - viscous * w - torque) * inverse_inertia
         b = (K * y1 + w * slope * i - viscous * a) * inverse_inertia
@@ -145,22 +135,22 @@ def conduct_pair(
             if not (abs(step) <= 1e-5 * u and u <= h):
                 u = crossing(off, y1, y2, y3, y4, h)
             h = u
-        turned = poles * h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
+        turned = gone + h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
         faster = w + h * (a + h * (0.5 * b + h * c / 6.0))
         end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
         if moving != 0:
-            if moving * faster <= 0.0 or into + turned >= ahead or into + turned <= 0.0:
-                return segments, t, i, w, into, area, high
+            if moving * faster <= 0.0 or turned >= upper or turned <= lower:
+                return segments, t, i, w, gone, area, high
         elif max(K * i, K * end) - torque > limit_forward or torque - min(K * i, K * end) > limit_backward:
-            return segments, t, i, w, into, area, high
+            return segments, t, i, w, gone, area, high
         area += h * (i + h * (y1 * 0.5 + h * (y2 / 3.0 + h * (y3 * 0.25 + h * y4 * 0.2))))
         i = end
-        w, into = faster, into + turned
+        w, gone = faster, turned
         segments += 1
         if tripped:
             high = not high
         elif last:
-            return segments, duration, i, w, into, area, high
+            return segments, duration, i, w, gone, area, high
         t += h
 
 
@@ -200,8 +190,12 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     tau = p.speed_latency_tau
     poles = p.pole_pairs
     ratio = p.gear_ratio
-    plain = not (modulated or heated or compliant or sagging) and saturation == 0.0 and tau <= 0.0
+    plain = not (heated or compliant or sagging) and saturation == 0.0 and tau <= 0.0
     plain = plain and p.cogging_a == 0.0 and p.stribeck_a == 0.0 and p.load_spring_c == 0.0
+    fastest = 0.0  # angular order of the fastest change of a back-EMF coefficient within a cell
+    if modulated:
+        fastest = 7.0 * poles if p.back_emf_shape_h5 != 0.0 or p.back_emf_shape_h7 != 0.0 else 1.0
+    K, dK, ddK = np.empty(3), np.empty(3), np.zeros(3)
     free_travel = 0.9 * p.end_stop * ratio
     inertia = p.inertia * p.inertia_scale
     shaft_inertia = (1.0 - MOTOR_SHARE) * inertia * ratio * ratio
@@ -302,36 +296,41 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             plus, minus = pair[cell, 0], pair[cell, 1]
             off = 3 - plus - minus
             gain = 0.5 * (gain_i[plus] + gain_i[minus])
-            centre = (I_ref - 0.5 * (offset_i[plus] - offset_i[minus])) / gain
-            dK = k[plus] * slope[cell, plus] - k[minus] * slope[cell, minus]
             into = poles * theta - turns * TWO_PI - edge[cell]
             upper = edge[cell + 1] if cell + 1 < cells else edge[0] + TWO_PI
+            for j in range(3):
+                K[j], dK[j] = value[cell, j] + slope[cell, j] * into, slope[cell, j] * poles
+                if modulated:
+                    K[j], dK[j], ddK[j] = modulate(p, theta, j, K[j], dK[j])
+                K[j], dK[j], ddK[j] = k[j] * K[j], k[j] * dK[j], k[j] * ddK[j]
+            chunk = h
+            if fastest * abs(w) * h > FINE:
+                chunk = FINE / (fastest * abs(w))
             held = moving * (coulomb_forward if moving > 0 else coulomb_backward)
-            count, elapsed, end_p, w, later, area_p, high = conduct_pair(
+            count, elapsed, end_p, w, d_theta, area_p, high = conduct_pair(
                 i[plus],
                 w,
-                into,
                 high,
-                h,
-                centre,
+                chunk,
+                (I_ref - 0.5 * (offset_i[plus] - offset_i[minus])) / gain,
                 band / gain,
                 supply,
                 R[plus] + R[minus] + 2.0 * drop,
                 inverse_L_pair[off],
-                k[plus] * value[cell, plus] - k[minus] * value[cell, minus],
-                dK,
-                poles,
+                K[plus] - K[minus],
+                dK[plus] - dK[minus],
+                ddK[plus] - ddK[minus],
                 p.load_constant_T / ratio + held,
                 viscous,
                 inverse_inertia if moving != 0 else 0.0,
                 moving,
                 limit_forward,
                 limit_backward,
-                upper - edge[cell],
+                -into / poles,
+                (upper - edge[cell] - into) / poles,
             )
-            d_theta = (later - into) / poles
             for j in range(3):
-                sum_e[j] += k[j] * (value[cell, j] + 0.5 * slope[cell, j] * (into + later)) * d_theta
+                sum_e[j] += d_theta * (K[j] + d_theta * (0.5 * dK[j] + d_theta * ddK[j] / 6.0))
             i[plus], i[minus] = end_p, -end_p
             sum_i[plus] += area_p
             sum_i[minus] -= area_p
@@ -340,8 +339,8 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             theta += d_theta
             reach = (theta - p.theta_0) / ratio
             shaft = min(max(shaft, reach - half_play), reach + half_play)
-            stopped_short = elapsed < h
-            t = t + elapsed if stopped_short else ends_at
+            stopped_short = elapsed < chunk
+            t = ends_at if elapsed == h else t + elapsed
             segments += count
             continue
         stopped_short = False
@@ -372,9 +371,9 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         Kp, Km, Ko = value[cell, plus] + dKp * into, value[cell, minus] + dKm * into, value[cell, off] + dKo * into
         dKp, dKm, dKo = dKp * poles, dKm * poles, dKo * poles
         if modulated:
-            Kp, dKp = modulate(p, theta, plus, Kp, dKp)
-            Km, dKm = modulate(p, theta, minus, Km, dKm)
-            Ko, dKo = modulate(p, theta, off, Ko, dKo)
+            Kp, dKp, _ = modulate(p, theta, plus, Kp, dKp)
+            Km, dKm, _ = modulate(p, theta, minus, Km, dKm)
+            Ko, dKo, _ = modulate(p, theta, off, Ko, dKo)
         kp, km, ko = k[plus], k[minus], k[off]
         Kp, Km, Ko = kp * Kp, km * Km, ko * Ko
         dKp, dKm, dKo = kp * dKp, km * dKm, ko * dKo

@@ -46,19 +46,39 @@ def phase_constants(p, R_winding, L, k):
 
 @compiled
 def angle_modulation(p, theta, j):
-    """g_j(theta) of the rotor-angle eccentricity laws and dynamic eccentricity, and dg/dtheta (1/rad)."""
-    g, dg = 1.0, 0.0
+    """g_j(theta) of the rotor-angle eccentricity laws and dynamic eccentricity, dg/dtheta and d2g/dtheta2."""
+    g, dg, ddg = 1.0, 0.0, 0.0
     if p.eccentricity_law > 0:
         angle = theta - (AXIS[j] if p.eccentricity_law == 2 else 0.0)
         c, s = np.cos(angle), np.sin(angle)
-        g += p.eccentricity[0] * c + p.eccentricity[1] * s
+        ddg = -(p.eccentricity[0] * c + p.eccentricity[1] * s)
+        g -= ddg
         dg += p.eccentricity[1] * c - p.eccentricity[0] * s
     if p.dynamic_eccentricity_d != 0.0:
         angle = theta - AXIS[j] - p.dynamic_eccentricity_psi
-        d = 1.0 + p.dynamic_eccentricity_d * np.cos(angle)
-        dg = dg * d - g * p.dynamic_eccentricity_d * np.sin(angle)
-        g *= d
-    return g, dg
+        swing, d1 = p.dynamic_eccentricity_d * np.cos(angle), -p.dynamic_eccentricity_d * np.sin(angle)
+        ddg = ddg * (1.0 + swing) + 2.0 * dg * d1 - g * swing
+        dg = dg * (1.0 + swing) + g * d1
+        g *= 1.0 + swing
+    return g, dg, ddg
+
+
+@compiled
+def modulate(p, theta, j, f, df):
+    """Add the shape's harmonics and the angle modulation of phase j to the trapezoid f and its derivative by theta.
+
+    Returns the coefficient and its first and second derivative by theta.
+    """
+    ddf = 0.0
+    if p.back_emf_shape_h5 != 0.0 or p.back_emf_shape_h7 != 0.0:
+        x = p.pole_pairs * theta - AXIS[j]
+        fifth, seventh = p.back_emf_shape_h5 * np.sin(5.0 * x), p.back_emf_shape_h7 * np.sin(7.0 * x)
+        slope = 5.0 * p.back_emf_shape_h5 * np.cos(5.0 * x) + 7.0 * p.back_emf_shape_h7 * np.cos(7.0 * x)
+        f += fifth + seventh
+        df += p.pole_pairs * slope
+        ddf = -p.pole_pairs * p.pole_pairs * (25.0 * fifth + 49.0 * seventh)
+    g, dg, ddg = angle_modulation(p, theta, j)
+    return f * g, df * g + f * dg, ddf * g + 2.0 * df * dg + f * ddg
 
 
 @compiled

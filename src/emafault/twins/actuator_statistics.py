@@ -43,6 +43,7 @@ REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
 JUMP_SPEED = 100.0  # rad/s by which the speed reference jumps in one interval when the command steps
 REGULATOR_SMOOTHING = 5.0e-4  # s, half span over which the current's reference is averaged before its slope is taken
 ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
+LOOK = 300  # values that are looked at first for whether the speed is rounded at all
 WEAKEST_INSTRUMENT = 0.05  # of an instrument's power that must be the current's own and not noise
 COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
 
@@ -248,6 +249,23 @@ def electromagnetic_torque(c, dt, i, theta, out):
         low, high = max(0, n - reach), min(n_time - 1, n + reach)
         inner = total[high + 1] - total[low] - 0.5 * (smooth[low] + smooth[high])
         out[n] = inner / (high - low)
+
+
+@compiled
+def lattice(values):
+    """Smallest spacing of rounded values where all spacings are multiples of it, else zero."""
+    ordered = np.sort(values)
+    spacing = 1.0e9
+    for n in range(1, len(ordered)):
+        gap = ordered[n] - ordered[n - 1]
+        if gap > 1e-9:
+            spacing = min(spacing, gap)
+    odd = 0
+    for n in range(1, len(ordered)):
+        times = (ordered[n] - ordered[n - 1]) / spacing
+        if abs(times - np.round(times)) > 1e-3:
+            odd += 1
+    return spacing if spacing > 1e-4 and spacing < 1.0e8 and odd < 0.01 * len(ordered) else 0.0
 
 
 @compiled
@@ -501,19 +519,9 @@ def fill_statistics(
     if not has_end:
         # mean currents cannot give di/dt across a switching ripple: what is regressed on it says nothing
         count[RIPPLE] = 0
-    # lattice of a rounded speed: the smallest spacing of its values where all spacings are multiples of it, else zero
-    ordered = np.sort(speed)
-    spacing = 1.0e9
-    for n in range(1, n_time):
-        gap = ordered[n] - ordered[n - 1]
-        if gap > 1e-9:
-            spacing = min(spacing, gap)
-    odd = 0
-    for n in range(1, n_time):
-        times = (ordered[n] - ordered[n - 1]) / spacing
-        if abs(times - np.round(times)) > 1e-3:
-            odd += 1
-    y[LATTICE] = spacing if spacing > 1e-4 and spacing < 1.0e8 and odd < 0.01 * n_time else 0.0
+    y[LATTICE] = lattice(speed[:: n_time // LOOK + 1])
+    if y[LATTICE] > 0.0:  # so few values tell that there is none, but not its spacing
+        y[LATTICE] = lattice(speed)
     count[LATTICE] = n_time
     norm[LATTICE] = 1.0
     y[OSCILLATION] = np.sqrt(play_power / n_time)
