@@ -19,6 +19,7 @@ SETTLED = 1.0  # prior standard deviations that a fit within the noise may still
 CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predictions must differ
 RENEWED = 4  # rounds in which they may be
 FAR = 2.0  # prior standard deviations that a round may move before noise and covariance are taken anew
+NO_MOVE = 0.2  # prior standard deviations over which derivatives stay what they are
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -73,6 +74,7 @@ class Problem:
             rows.setdefault(cell.recording, []).append(m)
         self.rows = {name: np.array(r) for name, r in rows.items()}
         self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
+        self._base: tuple[np.ndarray, np.ndarray] | None = None  # where nuisance derivatives were taken anew, and they
 
     # ---- whitening
     def set_covariance(self, values: np.ndarray, shy: bool = False) -> None:
@@ -275,7 +277,8 @@ class Problem:
         """Fit of the nuisances alone; calls the twin's ``settle`` (noise, start angle) where it has one."""
         values = np.array([p.off if p.effect else p.mean for p in self.parameters])
         settle = getattr(self.twin, "settle", None)
-        best, before, far = None, np.inf, False
+        best, before, far, shift = None, np.inf, False, np.inf
+        jacobian = np.zeros((0, 0))
         bounds = self.low.copy(), self.high.copy()
         unit = [m for m in self.nuisances if self.parameters[m].recordings is None]
         erratic = getattr(self.twin, "erratic", lambda name: False)
@@ -293,7 +296,8 @@ class Problem:
                     settle(values, self.part)
                 self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
-            jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
+            if not 0 < round_ <= first or shift > FAR:
+                jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
             best = self.descend(self.point(values, prediction, jacobian, self.nuisances))
             shift = float((np.abs(best.values - values) / self.sd)[self.nuisances].max())
             values, far = best.values, shift > FAR and round_ + 1 < RENEWED
@@ -331,6 +335,7 @@ class Problem:
         values = candidate.point.values
         prediction = self.predict(values)[0]
         base = self.nuisance_jacobian(values, prediction, self.nuisances)
+        self._base = values.copy(), base
         best = self.point(null.values, self.predict(null.values)[0], null.jacobian, self.nuisances)
         moved = self.solve(best.values, best.prediction, null.jacobian, self.nuisances)
         trial = self.point(moved, self.predict(moved)[0], null.jacobian, self.nuisances)
@@ -448,7 +453,11 @@ class Problem:
         own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
         point = candidate.point
-        base = self.nuisance_jacobian(point.values, point.prediction, self.nuisances)
+        known = self._base
+        if known is not None and np.max(np.abs(point.values - known[0]) / self.sd) < NO_MOVE:
+            base = known[1]
+        else:
+            base = self.nuisance_jacobian(point.values, point.prediction, self.nuisances)
         columns = self._effect_columns(point, own)
         jacobian = np.concatenate([base, columns], axis=1)
         start = self.point(point.values, point.prediction, jacobian, point.free, widened)

@@ -327,6 +327,11 @@ class ActuatorTwin:
             flexibility = effects["compliance"].pop("flexibility")
             stiff = flexibility < 1e-6
             effects["compliance"]["K"] = np.where(stiff, 0.0, 1.0 / np.where(stiff, 1.0, flexibility))
+            effects["compliance"]["C"] = np.where(stiff, 300.0, effects["compliance"]["C"])
+        if "stribeck" in effects:  # what does nothing must not make another run of the same physics
+            idle = effects["stribeck"]["a"] == 0.0
+            usual = EFFECTS["stribeck"].parameters["w_s"].nominal
+            effects["stribeck"]["w_s"] = np.where(idle, usual, effects["stribeck"]["w_s"])
         offset = effects.get("angle_offset", {}).get("offset", np.zeros(len(values)))
         theta_0 = b.theta_0 - np.deg2rad(offset) / self.actuator.pole_pairs
         return make_runs(self.actuator, faults, effects=effects, theta_0=theta_0)
