@@ -122,6 +122,18 @@ class Problem:
             return difference
         return np.where(np.abs(difference) > CLEAR * np.sqrt(2.0 * scatter(self.part)), difference, 0.0)
 
+    def smooth(self, values: np.ndarray) -> np.ndarray | None:
+        """(statistic,) prediction averaged over a twin's own scatter; None where it has none."""
+        smooth = getattr(self.twin, "smooth", None)
+        return None if smooth is None else smooth(values, self.part)
+
+    def averaged(self, point: Point, chosen: Sequence[Hypothesis] = ()) -> Point:
+        """The same fit with an averaged prediction."""
+        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        prediction = self.smooth(point.values)
+        assert prediction is not None
+        return self.point(point.values, prediction, point.jacobian, point.free, widened)
+
     def nuisance_jacobian(
         self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int], exact: bool = True
     ) -> np.ndarray:

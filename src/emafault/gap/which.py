@@ -1,6 +1,6 @@
 """Which effect: evidence of the empty set, of every effect, of pairs and triples by beam; goodness of fit; groups."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -16,6 +16,8 @@ REFINED_PAIRS = 3
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
 REBASES = 3
 CLOSE = 100.0  # gain below which the empty set is fitted a second time
+WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
+COMPARED = 4  # candidates that are compared without it
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 
 
@@ -48,7 +50,12 @@ def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
     """
     z = (problem.observed - prediction) / problem.deviations()
     groups: dict[tuple[str, str, str], list[float]] = {}
+    # how exactly an actuator hunts about its target proves nothing where other recordings are there to judge by
+    erratic = getattr(problem.twin, "erratic", lambda name: False)
+    judging = [name for name in problem.part if not erratic(name)] or list(problem.part)
     for cell, value in zip(problem.cells, z, strict=True):
+        if cell.recording not in judging:
+            continue
         groups.setdefault((cell.equation, cell.label, cell.along), []).append(float(value))
     out = [
         Family(e, label, along, float((np.square(v).sum() - len(v)) / np.sqrt(2.0 * len(v))), len(v))
@@ -132,13 +139,49 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         better = again.log_evidence - null.log_evidence
         if again is not null and better > 0.0:
             null, tried = again, {k: replace(c, gain=c.gain - better) for k, c in tried.items()}
-    # an effect more must be worth it: ``addition`` is the prior odds against each further member of a set
-    candidates = sorted(tried.values(), key=lambda c: addition * (len(c.effects) - 1) - c.gain)
+    candidates = _ranked(tried.values(), addition)
     if candidates and candidates[0].gain > HOPELESS:
         candidates[0] = problem.polish(null, candidates[0], by_id)
+        null, candidates = _without_luck(problem, null, candidates, by_id, addition)
     prediction = candidates[0].point.prediction if candidates else null.prediction
     after = families(problem, prediction)
     return Search(null, candidates, singles, after, families(problem, null.prediction))
+
+
+def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
+    """Best first; an effect more must be worth it: ``addition`` is the prior odds against each further member."""
+    return sorted(candidates, key=lambda c: addition * (len(c.effects) - 1) - c.gain)
+
+
+def _without_luck(
+    problem: Problem, null: Point, candidates: list[Candidate], by_id: dict[str, Hypothesis], addition: float
+) -> tuple[Point, list[Candidate]]:
+    """The leading candidates, and the null where it is near, compared on predictions averaged over their scatter.
+
+    A fit goes on where a single prediction happens to fall well, which is luck and not evidence.
+    """
+    if problem.smooth(null.values) is None:
+        return null, candidates
+    top = candidates[0].gain
+    leading = [c for c in candidates if c.gain > top - WITHIN_LUCK][:COMPARED]
+    if top < WITHIN_LUCK:
+        again = problem.averaged(null)
+        shift = again.log_evidence - null.log_evidence
+        null, candidates = again, [replace(c, gain=c.gain - shift) for c in candidates]
+        leading = candidates[: len(leading)]
+    elif len(leading) == 1:
+        return null, candidates
+    rest = candidates[len(leading) :]
+
+    def averaged(c: Candidate) -> Candidate:
+        point = problem.averaged(c.point, [by_id[e] for e in c.effects])
+        return replace(c, point=point, gain=point.log_evidence - null.log_evidence)
+
+    ranked = _ranked([*map(averaged, leading), *rest], addition)
+    if not ranked[0].polished:
+        ranked[0] = averaged(problem.polish(null, ranked[0], by_id))
+        ranked = _ranked(ranked, addition)
+    return null, ranked
 
 
 def _best(tried: dict[tuple[str, ...], Candidate], size: int) -> list[Candidate]:
@@ -213,7 +256,7 @@ def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> li
     for other in candidates[1:]:
         if set(other.effects) > set(first.effects) or set(other.effects) < set(first.effects):
             continue
-        difference = problem.whiten(other.point.prediction - first.point.prediction)
+        difference = problem.whiten(problem.seen(other.point.prediction - first.point.prediction))
         if problem.squared_distance(null, difference) < GROUP_DISTANCE and first.gain - other.gain < GROUP_DISTANCE / 2:
             members.append(other)
     return [members]

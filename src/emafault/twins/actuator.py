@@ -35,10 +35,12 @@ NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
 HUNTING = 4.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
+HUNTING_ASIDE = 25.0  # the same where enough other recordings are there to judge by
 FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
-COMMUTATION_FLOOR = 0.08  # of the share of current around a commutation: how it falls between recording instants
-START_SCATTER = 2e-3  # rad, over which commutations fall differently between the recording instants
+COMMUTATION_FLOOR = 0.01  # of the share of current around a commutation: how it falls between recording instants
+RIPPLE_SCATTER = 1.5e-3  # relative, of the comparator's band, over which the ripple falls differently
+START_SCATTER = 5e-4  # rad, over which commutations fall differently between the recording instants
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
 #: statistics of the three phases, (phase, statistic)
 ALIKE = (
@@ -122,6 +124,8 @@ class ActuatorTwin:
         self.parameters = self._parameters()
         self.index = {p.name: m for m, p in enumerate(self.parameters)}
         self.hypotheses = self._hypotheses()
+        smooth = sum(not self.erratic(name) for name in recordings)
+        self._hunting = HUNTING_ASIDE if smooth >= 3 else HUNTING
         self._offset: dict[str, np.ndarray] = {}
         self._cache: dict[tuple[str, bytes], np.ndarray] = {}
 
@@ -457,15 +461,13 @@ class ActuatorTwin:
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
-        rng = np.random.default_rng(2)
-        shifts = {name: START_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
-        offsets = {name: COMMAND_SCATTER * rng.standard_normal(JITTER_REPEATS) for name in part}
+        shifts = self._shifts(part)
 
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
             count = FIRST_REPEATS if first else JITTER_REPEATS
-            jitter = b.jitter = self._jitter(name, run, shifts[name][:count], offsets[name][:count])
+            jitter = b.jitter = self._jitter(name, run, shifts[name][:, :count])
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
@@ -496,14 +498,32 @@ class ActuatorTwin:
         brought = [self._brought[name] for name in part]
         return np.concatenate([(none if b.jitter is None else b.jitter)[b.usable] for b in brought])
 
-    def _jitter(self, name: str, run: np.void, shifts: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-        """(statistic,) variance over simulations of the same physics that switch at other instants."""
+    def smooth(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
+        """(statistic,) prediction averaged over where its switching falls."""
+        shifts = self._shifts(part)
+
+        def work(name: str) -> np.ndarray:
+            run = self._runs(values[None, :], name)[0]
+            mean = np.mean(self._repeats(name, run, *shifts[name]), axis=0) + self._offset.get(name, 0.0)
+            return mean[self._brought[name].usable]
+
+        with ThreadPoolExecutor(self.threads) as pool:
+            return np.concatenate(list(pool.map(work, part)))
+
+    def _shifts(self, part: Sequence[str]) -> dict[str, np.ndarray]:
+        """Recording -> (angle or command, repeat) shifts by which the same physics switches at other instants."""
+        rng = np.random.default_rng(2)
+        scale = np.array([[START_SCATTER], [COMMAND_SCATTER]])
+        return {name: scale * rng.standard_normal((2, JITTER_REPEATS)) for name in part}
+
+    def _repeats(self, name: str, run: np.void, shifts: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        """(repeat, statistic) of simulations of the same physics that switch at other instants."""
         b = self._brought[name]
         command, repeats = b.command, []
         for shift, offset in zip(shifts, offsets, strict=True):
             moved = run.copy()
             moved["theta_0"] += shift
-            moved["hysteresis"] *= 1.0 + shift
+            moved["hysteresis"] *= 1.0 + shift * RIPPLE_SCATTER / START_SCATTER
             if len(b.jumps):
                 # when within its interval a step came is known to a part of it only
                 part = float(np.clip(0.5 + offset / COMMAND_SCATTER * 0.3, 0.0, 1.0))
@@ -513,10 +533,15 @@ class ActuatorTwin:
                 signals["commanded_position"] = signals["commanded_position"] + offset
             repeats.append(self._as_recorded(name, moved, signals))
         b.command = command
-        variance = np.var(repeats, axis=0, ddof=1)
+        return np.array(repeats)
+
+    def _jitter(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
+        """(statistic,) variance of a single prediction by where its switching falls."""
+        b = self._brought[name]
+        variance = np.var(self._repeats(name, run, *shifts), axis=0, ddof=1)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
             variance[alike] = 0.5 * (variance[alike] + variance[alike].mean(axis=0))
-        return variance * (1.0 + 2.0 / len(repeats)) * (HUNTING if len(b.jumps) else 1.0)
+        return variance * (1.0 + 2.0 / shifts.shape[1]) * (self._hunting if len(b.jumps) else 1.0)
 
     # ---- what the verdict says
     def report(

@@ -522,6 +522,8 @@ def fill_statistics(
     y[LATTICE] = lattice(speed[:: n_time // LOOK + 1])
     if y[LATTICE] > 0.0:  # so few values tell that there is none, but not its spacing
         y[LATTICE] = lattice(speed)
+    if y[LATTICE] > 0.0:
+        count[_CONTROL:_COMMUTATION] = 0  # the slope of a reference made of rounded speeds is that of the rounding
     count[LATTICE] = n_time
     norm[LATTICE] = 1.0
     y[OSCILLATION] = np.sqrt(play_power / n_time)

@@ -17,7 +17,7 @@ from .cases import Case
 from .statistics import Unit, View, coarser, less, simulate_plan
 
 LATTICE = 1e6  # squared distance by which rounded values differ from unrounded ones: one look at them tells
-PLAIN = 5e3  # above it a squared distance to the nominal model is not refined
+PLAIN = 1e6  # above it a squared distance to the nominal model is not refined
 SCATTER = 2.0  # half would be one run's variance; derivatives carry the scatter of several
 STRIDE = 1.5  # largest step of a nuisance
 FAR = 5.0  # no nuisance further than this, in prior standard deviations
