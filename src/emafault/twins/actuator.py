@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..actuator.commands import resample
 from ..actuator.kernel import run_actuator
@@ -34,13 +35,17 @@ MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
-HUNTING = 4.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
+TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
+HUNTING = 10.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
 HUNTING_ASIDE = 25.0  # the same where enough other recordings are there to judge by
 FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
-COMMUTATION_FLOOR = 0.01  # of the share of current around a commutation: how it falls between recording instants
-RIPPLE_SCATTER = 1.5e-3  # relative, of the comparator's band, over which the ripple falls differently
-START_SCATTER = 5e-4  # rad, over which commutations fall differently between the recording instants
+COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
+RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
+RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance, and with it the ripple's frequency
+START_SCATTER = 5e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
+SMOOTHED = 25  # samples over which the angle's noise is averaged before
+ASTRAY = 3.0  # times the angle by which recording and simulation go apart, over which they do
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
 #: statistics of the three phases, (phase, statistic)
 ALIKE = (
@@ -90,6 +95,7 @@ class _Brought:
     theta_0: float
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
+    start_scatter: float = START_SCATTER[1]  # rad
     settled: int = 0  # how often noise has been taken
 
 
@@ -394,6 +400,8 @@ class ActuatorTwin:
         drift = float(np.median((b.signals["rotor_angle"] - clean["rotor_angle"])[:first]))
         if abs(drift) < 0.2:
             b.theta_0 += drift
+        apart = uniform_filter1d(b.signals["rotor_angle"] - clean["rotor_angle"], SMOOTHED)
+        b.start_scatter = float(np.clip(ASTRAY * np.std(apart), *START_SCATTER))
         return clean
 
     def _place_steps(self, name: str, run: np.void) -> None:
@@ -467,14 +475,16 @@ class ActuatorTwin:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
             count = FIRST_REPEATS if first else JITTER_REPEATS
-            jitter = b.jitter = self._jitter(name, run, shifts[name][:, :count])
+            jitter = self._jitter(name, run, shifts[name][:, :count])
+            b.jitter = np.diag(jitter)
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
             # the recording scatters once and the single simulation it is compared with once more
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
-            extra = 2.0 * jitter + (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
+            cov += 2.0 * jitter
+            extra = (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
             extra[_COMMUTATION:] += aligned
             # a speed that changes slowly is rounded the same way for many samples on end
             step = float(run["speed_quantisation_step"])
@@ -504,26 +514,30 @@ class ActuatorTwin:
 
         def work(name: str) -> np.ndarray:
             run = self._runs(values[None, :], name)[0]
-            mean = np.mean(self._repeats(name, run, *shifts[name]), axis=0) + self._offset.get(name, 0.0)
+            mean = np.mean(self._repeats(name, run, shifts[name]), axis=0) + self._offset.get(name, 0.0)
             return mean[self._brought[name].usable]
 
         with ThreadPoolExecutor(self.threads) as pool:
             return np.concatenate(list(pool.map(work, part)))
 
     def _shifts(self, part: Sequence[str]) -> dict[str, np.ndarray]:
-        """Recording -> (angle or command, repeat) shifts by which the same physics switches at other instants."""
+        """Recording -> (angle, comparator or command, repeat) shifts by which the same physics switches at other instants."""
         rng = np.random.default_rng(2)
-        scale = np.array([[START_SCATTER], [COMMAND_SCATTER]])
-        return {name: scale * rng.standard_normal((2, JITTER_REPEATS)) for name in part}
+        drawn = {name: rng.standard_normal((3, JITTER_REPEATS)) for name in part}
+        out = {}
+        for name, b in ((name, self._brought[name]) for name in part):
+            ripple = RIPPLE_SCATTER if b.nominal.has_end else RIPPLE_UNKNOWN
+            out[name] = np.array([[b.start_scatter], [ripple], [COMMAND_SCATTER]]) * drawn[name]
+        return out
 
-    def _repeats(self, name: str, run: np.void, shifts: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    def _repeats(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
         """(repeat, statistic) of simulations of the same physics that switch at other instants."""
         b = self._brought[name]
         command, repeats = b.command, []
-        for shift, offset in zip(shifts, offsets, strict=True):
+        for turn, band, offset in shifts.T:
             moved = run.copy()
-            moved["theta_0"] += shift
-            moved["hysteresis"] *= 1.0 + shift * RIPPLE_SCATTER / START_SCATTER
+            moved["theta_0"] += turn
+            moved["hysteresis"] *= 1.0 + band
             if len(b.jumps):
                 # when within its interval a step came is known to a part of it only
                 part = float(np.clip(0.5 + offset / COMMAND_SCATTER * 0.3, 0.0, 1.0))
@@ -536,12 +550,17 @@ class ActuatorTwin:
         return np.array(repeats)
 
     def _jitter(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
-        """(statistic,) variance of a single prediction by where its switching falls."""
+        """(statistic, statistic) covariance of a single prediction by where its switching falls."""
         b = self._brought[name]
-        variance = np.var(self._repeats(name, run, *shifts), axis=0, ddof=1)
+        repeats = self._repeats(name, run, shifts)
+        apart = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
+        variance = np.square(apart).sum(axis=0)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
             variance[alike] = 0.5 * (variance[alike] + variance[alike].mean(axis=0))
-        return variance * (1.0 + 2.0 / shifts.shape[1]) * (self._hunting if len(b.jumps) else 1.0)
+        # what scatters together counts once; as few repeats tell of it little, half is taken for independent
+        out = TOGETHER * apart.T @ apart
+        out[np.diag_indices(SIZE)] = variance
+        return out * (1.0 + 2.0 / len(repeats)) * (self._hunting if len(b.jumps) else 1.0)
 
     # ---- what the verdict says
     def report(
