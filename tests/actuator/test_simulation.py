@@ -124,3 +124,31 @@ def test_locked_rotor_reaches_the_steady_current_of_two_phases(fault):
     np.testing.assert_allclose(np.abs(current[on]), steady, rtol=1e-6)
     np.testing.assert_allclose(signals["phase_voltage"][0, -1, on], (R * current)[on], rtol=1e-6)
     assert np.all(signals["rotor_angle"] == 0.0)
+
+
+def test_a_loop_in_two_phases_is_the_general_run(monkeypatch):
+    """The fast loop and the general segment are two writings of one physics: a supply resistance of nothing but
+    rounding keeps a run out of the fast loop and must not change it."""
+    for name, settings, duration in (
+        ("parabolic", {"acceleration": 0.4}, 0.3),
+        ("reversal", {"amplitude": 0.02, "speed": 0.3}, 0.3),
+    ):
+        fast = simulate(make_runs(ACTUATOR, FAULT), command(name, duration, **settings), duration, 2e-4)
+        general = make_runs(ACTUATOR, FAULT, effects={"bus_resistance": {"R": np.array([1e-13])}})
+        slow = simulate(general, command(name, duration, **settings), duration, 2e-4)
+        for signal, values in fast.items():
+            assert values == pytest.approx(slow[signal], rel=1e-6, abs=1e-6), (name, signal)
+
+
+@pytest.mark.parametrize("s", [0.05, 0.07])
+def test_a_saturating_inductance_at_the_current_limit_comes_to_an_end(s):
+    """At 20 A the inductance is a twentieth of its own: segments must shorten and the run must not stall."""
+    step = command("step", 0.1, amplitude=0.05, time=0.01)
+    runs = make_runs(ACTUATOR, HEALTHY, effects={"inductance_saturation": {"s": np.array([s])}})
+    signals = simulate(runs, step, 0.1, 2e-4)
+    plain = simulate(make_runs(ACTUATOR, HEALTHY), step, 0.1, 2e-4)
+    assert np.max(np.abs(signals["phase_current"])) > 0.9 * ACTUATOR.current_limit
+    for name, values in signals.items():
+        assert np.all(np.isfinite(values)), name
+    # the regulator sets the current whatever the inductance, so the motion is nearly the same
+    assert signals["output_position"] == pytest.approx(plain["output_position"], abs=0.02 * 0.05)

@@ -435,8 +435,9 @@ class Problem:
         free = [*self.nuisances, *own]
         jacobian = candidate.point.jacobian.copy()
         jacobian[:, : len(self.nuisances)] = null.jacobian
-        values = candidate.point.values
-        best = self.point(values, self.predict(values)[0], jacobian, free, widened)
+        both = (candidate.point.values, candidate.start)
+        starts = [self.point(v, self.predict(v)[0], jacobian, free, widened) for v in both]
+        best = min(starts, key=lambda point: point.objective)
         for round_ in range(rounds):
             if own and renew and round_ in (0, 2):
                 jacobian = jacobian.copy()

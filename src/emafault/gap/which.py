@@ -256,8 +256,12 @@ def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> li
     for other in candidates[1:]:
         if set(other.effects) > set(first.effects) or set(other.effects) < set(first.effects):
             continue
-        difference = problem.whiten(problem.seen(other.point.prediction - first.point.prediction))
-        if problem.squared_distance(null, difference) < GROUP_DISTANCE and first.gain - other.gain < GROUP_DISTANCE / 2:
+        apart = other.point.prediction - first.point.prediction
+        distance = problem.squared_distance(null, problem.whiten(problem.seen(apart)))
+        scatter = problem.squared_distance(null, problem.whiten(apart)) - distance
+        # what merely scatters between two predictions moves their log evidence by as much
+        alike = GROUP_DISTANCE / 2 + np.sqrt(max(scatter, 0.0))
+        if distance < GROUP_DISTANCE and first.gain - other.gain < alike:
             members.append(other)
     return [members]
 

@@ -35,6 +35,7 @@ MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
+RIPPLE_REPEATS = 4  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
 HUNTING = 10.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
 HUNTING_ASIDE = 25.0  # the same where enough other recordings are there to judge by
@@ -96,6 +97,7 @@ class _Brought:
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
+    repeats: int = 1  # simulations behind a prediction
     settled: int = 0  # how often noise has been taken
 
 
@@ -150,7 +152,10 @@ class ActuatorTwin:
         command = self._command(recording, jumps)
         computed = compute(nominal, signals, keep=True)
         usable = computed.count >= MINIMUM_COUNT
-        return _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
+        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
+        if not nominal.has_end:
+            brought.repeats = RIPPLE_REPEATS
+        return brought
 
     def erratic(self, name: str) -> bool:
         """Whether small changes may change a recording's statistics abruptly: after a step the actuator hunts."""
@@ -357,6 +362,9 @@ class ActuatorTwin:
         return out
 
     def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
+        b = self._brought[name]
+        if b.repeats > 1:
+            return self._repeats(name, run, self._shifts(name)[:, : b.repeats]).mean(axis=0)
         return self._as_recorded(name, run, self._simulate(name, run))
 
     def _as_recorded(self, name: str, run: np.void, signals: dict) -> np.ndarray:
@@ -469,21 +477,19 @@ class ActuatorTwin:
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
-        shifts = self._shifts(part)
-
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
             count = FIRST_REPEATS if first else JITTER_REPEATS
-            jitter = self._jitter(name, run, shifts[name][:, :count])
-            b.jitter = np.diag(jitter)
+            jitter = self._jitter(name, run, self._shifts(name)[:, :count])
+            b.jitter = np.diag(jitter) / b.repeats
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
             cov *= 1.0 + 1.0 / NOISE_REPEATS
-            # the recording scatters once and the single simulation it is compared with once more
+            # the recording scatters once and the simulations it is compared with once more
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
-            cov += 2.0 * jitter
+            cov += (1.0 + 1.0 / b.repeats) * jitter
             extra = (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
             extra[_COMMUTATION:] += aligned
             # a speed that changes slowly is rounded the same way for many samples on end
@@ -510,25 +516,20 @@ class ActuatorTwin:
 
     def smooth(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """(statistic,) prediction averaged over where its switching falls."""
-        shifts = self._shifts(part)
-
         def work(name: str) -> np.ndarray:
             run = self._runs(values[None, :], name)[0]
-            mean = np.mean(self._repeats(name, run, shifts[name]), axis=0) + self._offset.get(name, 0.0)
+            mean = np.mean(self._repeats(name, run, self._shifts(name)), axis=0) + self._offset.get(name, 0.0)
             return mean[self._brought[name].usable]
 
         with ThreadPoolExecutor(self.threads) as pool:
             return np.concatenate(list(pool.map(work, part)))
 
-    def _shifts(self, part: Sequence[str]) -> dict[str, np.ndarray]:
-        """Recording -> (angle, comparator or command, repeat) shifts by which the same physics switches at other instants."""
-        rng = np.random.default_rng(2)
-        drawn = {name: rng.standard_normal((3, JITTER_REPEATS)) for name in part}
-        out = {}
-        for name, b in ((name, self._brought[name]) for name in part):
-            ripple = RIPPLE_SCATTER if b.nominal.has_end else RIPPLE_UNKNOWN
-            out[name] = np.array([[b.start_scatter], [ripple], [COMMAND_SCATTER]]) * drawn[name]
-        return out
+    def _shifts(self, name: str) -> np.ndarray:
+        """(angle, comparator or command, repeat) shifts by which the same physics switches at other instants."""
+        b = self._brought[name]
+        ripple = RIPPLE_SCATTER if b.nominal.has_end else RIPPLE_UNKNOWN
+        scale = np.array([[b.start_scatter], [ripple], [COMMAND_SCATTER]])
+        return scale * np.random.default_rng([2, *name.encode()]).standard_normal((3, JITTER_REPEATS))
 
     def _repeats(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
         """(repeat, statistic) of simulations of the same physics that switch at other instants."""
