@@ -114,21 +114,20 @@ def test_derived_derivatives_agree_with_differences():
     problem = Problem(twin, twin.names)
     values = np.array([p.off if p.effect else p.mean for p in problem.parameters])
     prediction = problem.predict(values)[0]
-    twin.settle(values, twin.names)
-    problem.set_covariance(values)
     exact = problem.nuisance_jacobian(values, prediction, problem.nuisances)
     for name, step in (("unit_calibration.k_scale", 0.01), ("2.dT", 5.0)):
         m = problem.names[name]
-        # a single difference scatters with the switching; the mean over steps either way does so less
+        # a single difference scatters with the switching, the mean over steps either way does so less; the derived
+        # one is made of steps in the faults as wide as their prior, and differs by their curvature
         differences = []
         for part in (-1.0, -0.75, -0.5, 0.5, 0.75, 1.0):
             moved = values.copy()
             moved[m] += part * step
             differences.append((problem.predict(moved)[0] - prediction) / (part * step))
         difference = np.mean(differences, axis=0)
-        difference, column = problem.whiten(difference), problem.whiten(exact[:, problem.nuisances.index(m)])
+        column = exact[:, problem.nuisances.index(m)]
         cosine = column @ difference / np.linalg.norm(column) / np.linalg.norm(difference)
-        assert cosine > 0.98, (name, cosine)
+        assert cosine > 0.96, (name, cosine)
         assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
 
 

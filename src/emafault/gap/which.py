@@ -258,9 +258,8 @@ def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> li
             continue
         apart = other.point.prediction - first.point.prediction
         distance = problem.squared_distance(null, problem.whiten(problem.seen(apart)))
-        scatter = problem.squared_distance(null, problem.whiten(apart)) - distance
-        # what merely scatters between two predictions moves their log evidence by as much
-        alike = GROUP_DISTANCE / 2 + np.sqrt(max(scatter, 0.0))
+        # two predictions so far apart differ in log evidence by about as much from the noise of the data alone
+        alike = GROUP_DISTANCE / 2 + 2.0 * np.sqrt(problem.squared_distance(null, problem.whiten(apart)))
         if distance < GROUP_DISTANCE and first.gain - other.gain < alike:
             members.append(other)
     return [members]
