@@ -105,7 +105,8 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
         if c.effects not in inside and not (set(c.effects) > names or set(c.effects) < names)
     ]
     margin = best.gain - max([*rivals, 0.0])
-    before, after = found.null.misfit - dof, best.point.misfit - dof
+    # with the priors' part: a parameter far outside its tolerance is a gap that the null hides in its nuisances
+    before, after = found.null.objective - dof, best.point.objective - dof
     unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
     return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
 

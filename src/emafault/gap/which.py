@@ -16,6 +16,7 @@ REFINED_PAIRS = 3
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
 REBASES = 3
 CLOSE = 100.0  # gain below which the empty set is fitted a second time
+DESERVED = 0.3  # share of what a set leaves that one more effect must take up
 WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
 COMPARED = 4  # candidates that are compared without it
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
@@ -70,6 +71,13 @@ def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
     return any(abs(point.values[m] - problem.mean[m]) > FAR_OUTSIDE * problem.sd[m] for m in own)
 
 
+def negligible(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
+    """Whether an effect is smaller than it ever is, where its realistic range does not begin at zero."""
+    own = [problem.parameters[m] for m in problem.effect_parameters(hypothesis)]
+    sizes = [(abs(point.values[problem.names[p.name]] - p.off), p.least) for p in own if p.least > 0.0]
+    return bool(sizes) and all(size < least for size, least in sizes)
+
+
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
     """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence one more effect must bring."""
     null = problem.fit_null()
@@ -86,6 +94,8 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     def accept(candidate: Candidate) -> None:
         key = tuple(sorted(candidate.effects))
         if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
+            return
+        if any(negligible(problem, by_id[e], candidate.point) for e in key):
             return
         if key not in tried or candidate.gain > tried[key].gain:
             tried[key] = candidate
@@ -143,6 +153,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     if candidates and candidates[0].gain > HOPELESS:
         candidates[0] = problem.polish(null, candidates[0], by_id)
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
+        candidates = _deserved(problem, candidates)
     prediction = candidates[0].point.prediction if candidates else null.prediction
     after = families(problem, prediction)
     return Search(null, candidates, singles, after, families(problem, null.prediction))
@@ -151,6 +162,22 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
     """Best first; an effect more must be worth it: ``addition`` is the prior odds against each further member."""
     return sorted(candidates, key=lambda c: addition * (len(c.effects) - 1) - c.gain)
+
+
+def _deserved(problem: Problem, ranked: list[Candidate]) -> list[Candidate]:
+    """Give way to a smaller set where what the larger one adds is little of what the smaller one leaves.
+
+    A cause written in another form leaves a remainder, and some other effect always takes a little of it up.
+    """
+    if not ranked[0].polished:
+        return ranked
+    for part in ranked[1:]:
+        if not set(part.effects) < set(ranked[0].effects):
+            continue
+        left = part.point.misfit - len(problem.cells)
+        if part.point.misfit - ranked[0].point.misfit < DESERVED * left:
+            return [part, *(c for c in ranked if c is not part)]
+    return ranked
 
 
 def _without_luck(

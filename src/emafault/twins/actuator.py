@@ -44,9 +44,10 @@ COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target g
 COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
 RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
 RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance, and with it the ripple's frequency
-START_SCATTER = 5e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
+START_SCATTER = 2e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
 SMOOTHED = 25  # samples over which the angle's noise is averaged before
 ASTRAY = 3.0  # times the angle by which recording and simulation go apart, over which they do
+NEGLIGIBLE = 0.2  # of the smallest realistic value of an effect, below which it is not there
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
 #: statistics of the three phases, (phase, statistic)
 ALIKE = (
@@ -79,6 +80,8 @@ _OWN: dict[str, dict[str, tuple[str, float, float]]] = {
     "compliance": {"flexibility": ("rad/(N m)", 0.0, 8e-4), "C": ("N m s/rad", 150.0, 500.0)},
     "self_heating": {"heating_rate": ("K/J", 0.0, 0.5)},
 }
+#: smallest realistic value of these, where it is not zero
+_LEAST = {"compliance.flexibility": 5e-5, "self_heating.heating_rate": 1.0 / 30.0}
 
 
 @dataclass
@@ -209,7 +212,9 @@ class ActuatorTwin:
                     mean = 300.0 if name == "C" else 0.0
                     sd = 100.0 if name == "C" else sd
                     step = 0.1 * (high - low)
-                    out.append(Parameter(f"{effect.id}.{name}", units, off, mean, sd, low, high, step, effect.id))
+                    least = NEGLIGIBLE * _LEAST.get(f"{effect.id}.{name}", 0.0)
+                    label = f"{effect.id}.{name}"
+                    out.append(Parameter(label, units, off, mean, sd, low, high, step, effect.id, least=least))
                 continue
             for name, p in effect.parameters.items():
                 width = max(abs(p.high - p.nominal), abs(p.low - p.nominal))
@@ -230,6 +235,7 @@ class ActuatorTwin:
                         high,
                         0.2 * width,
                         effect.id,
+                        least=NEGLIGIBLE * max(p.low - p.nominal, p.nominal - p.high, 0.0),
                     )
                 )
         return out
@@ -409,7 +415,9 @@ class ActuatorTwin:
         if abs(drift) < 0.2:
             b.theta_0 += drift
         apart = uniform_filter1d(b.signals["rotor_angle"] - clean["rotor_angle"], SMOOTHED)
-        b.start_scatter = float(np.clip(ASTRAY * np.std(apart), *START_SCATTER))
+        least, most = START_SCATTER
+        least *= max(1.0, b.nominal.interval / 2e-4)  # the fewer samples, the more each of them weighs
+        b.start_scatter = float(np.clip(ASTRAY * np.std(apart), least, most))
         return clean
 
     def _place_steps(self, name: str, run: np.void) -> None:
