@@ -23,7 +23,12 @@ from emafault.effects import EFFECTS
 
 LIMIT = 1.2
 ROUNDING = 1e-13  # differences above this would be another physics
-OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}  # those of actuator/compiled.py
+#: those of actuator/compiled.py
+OPTIONS = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz", "arcp"},
+}
 
 
 def specialised() -> tuple[dict, int]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .compiled import compiled
 from .friction import coulomb_torque, sliding_torque, static_limit
-from .motor import AXIS, MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
+from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 
 NEVER = 1.0e30
 LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment

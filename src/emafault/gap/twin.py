@@ -73,9 +73,9 @@ class Twin(Protocol):
     """A machine as the diagnosis sees it. ``part`` is a sequence of recording names.
 
     A twin may also offer ``scatter(part)``, the variance (statistic,) of one prediction where predictions are not
-    smooth in their parameters, and ``smooth(values, part)``, a prediction (statistic,) averaged over it; ``report(effect, values, deviations)``, which turns the parameters of an effect as
-    fitted into those of the catalogue: name -> (value, low, high, units); and ``experiments(values)``, the menu of
-    next experiments.
+    smooth in their parameters, and ``smooth(values, part)``, a prediction (statistic,) averaged over it;
+    ``report(effect, values, deviations)``, which turns the parameters of an effect as fitted into those of the
+    catalogue: name -> (value, low, high, units); and ``experiments(values)``, the menu of next experiments.
     """
 
     @property

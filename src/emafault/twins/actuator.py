@@ -43,7 +43,7 @@ FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
 RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
-RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance, and with it the ripple's frequency
+RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance and so the ripple's frequency
 START_SCATTER = 2e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
 SMOOTHED = 25  # samples over which the angle's noise is averaged before
 ASTRAY = 3.0  # times the angle by which recording and simulation go apart, over which they do
@@ -485,6 +485,7 @@ class ActuatorTwin:
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
+
         def work(name: str) -> np.ndarray:
             b = self._brought[name]
             run = self._runs(values[None, :], name)[0]
@@ -524,6 +525,7 @@ class ActuatorTwin:
 
     def smooth(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """(statistic,) prediction averaged over where its switching falls."""
+
         def work(name: str) -> np.ndarray:
             run = self._runs(values[None, :], name)[0]
             mean = np.mean(self._repeats(name, run, self._shifts(name)), axis=0) + self._offset.get(name, 0.0)
