@@ -19,6 +19,7 @@ SETTLED = 1.0  # prior standard deviations that a fit within the noise may still
 CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predictions must differ
 RENEWED = 4  # rounds in which they may be
 FAR = 2.0  # prior standard deviations that a round may move before noise and covariance are taken anew
+WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of an amplitude's prior
 NO_MOVE = 0.2  # prior standard deviations over which derivatives stay what they are
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
@@ -257,12 +258,33 @@ class Problem:
         objective = misfit + float((((values[free] - mean) / sd) ** 2).sum())
         if not np.isfinite(objective):
             objective = np.inf
-        scaled = self.whiten(jacobian) * sd
-        information = np.eye(len(free)) + scaled.T @ scaled
-        _, logdet = np.linalg.slogdet(information)
+        whitened = self.whiten(jacobian)
+        inner = whitened.T @ whitened
+        information = np.eye(len(free)) + np.outer(sd, sd) * inner
         covariance = np.outer(sd, sd) * np.linalg.inv(information)
-        evidence = -0.5 * objective - 0.5 * float(logdet)
+        evidence = self._evidence(misfit, (values[free] - mean) / sd, np.outer(sd, sd) * inner, free)
         return Point(values, prediction, objective, misfit, evidence, tuple(free), jacobian, covariance)
+
+    def _evidence(self, misfit: float, shift: np.ndarray, information: np.ndarray, free: Sequence[int]) -> float:
+        """Laplace evidence; ``shift`` (free,) and ``information`` (free, free) in units of the priors.
+
+        The amplitude of an effect is as likely in one decade as in the next: its prior is a mixture of Gaussians of
+        decreasing width, of which the best stands for all.
+        """
+        width = np.ones(len(free))
+
+        def of(width: np.ndarray) -> float:
+            inner = np.eye(len(free)) + information * np.outer(width, width)
+            return -0.5 * (misfit + float(np.square(shift / width).sum())) - 0.5 * float(np.linalg.slogdet(inner)[1])
+
+        found = of(width)
+        owners = [self.parameters[m].effect if self.parameters[m].amplitude else None for m in free]
+        for effect in sorted({o for o in owners if o is not None}):
+            own = np.array([o == effect for o in owners])
+            tried = [np.where(own, factor, width) for factor in WIDTHS]
+            best = max(tried, key=of)
+            width, found = best, of(best)
+        return found - len({o for o in owners if o is not None}) * float(np.log(len(WIDTHS)))
 
     def descend(self, best: Point, widened: Sequence[int] = (), iterations: int = 4) -> Point:
         """Gauss-Newton steps with the point's own derivatives, halved where they overshoot, until they gain nothing."""

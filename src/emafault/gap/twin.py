@@ -51,6 +51,7 @@ class Parameter:
     effect: str | None = None
     recordings: tuple[str, ...] | None = None
     fault: str | None = None  # component of the fault vector that this parameter is, if any
+    amplitude: bool = False  # of an effect, which may be any power of ten smaller than its prior is wide
     least: float = 0.0  # distance from ``off`` below which an effect is none: smaller than it ever is
 
 

@@ -214,7 +214,11 @@ class ActuatorTwin:
                     step = 0.1 * (high - low)
                     least = NEGLIGIBLE * _LEAST.get(f"{effect.id}.{name}", 0.0)
                     label = f"{effect.id}.{name}"
-                    out.append(Parameter(label, units, off, mean, sd, low, high, step, effect.id, least=least))
+                    small = effect.id == "dynamic_eccentricity"
+                    own = Parameter(
+                        label, units, off, mean, sd, low, high, step, effect.id, amplitude=small, least=least
+                    )
+                    out.append(own)
                 continue
             for name, p in effect.parameters.items():
                 width = max(abs(p.high - p.nominal), abs(p.low - p.nominal))
@@ -235,7 +239,9 @@ class ActuatorTwin:
                         high,
                         0.2 * width,
                         effect.id,
-                        least=NEGLIGIBLE * max(p.low - p.nominal, p.nominal - p.high, 0.0),
+                        amplitude=p.low <= p.nominal <= p.high and name != "w_s",
+                        # a switch is on or off, whatever value a fit has left it at
+                        least=NEGLIGIBLE * max(p.low - p.nominal, p.nominal - p.high, 0.0) * (p.low < p.high),
                     )
                 )
         return out
@@ -596,6 +602,10 @@ class ActuatorTwin:
                 out["K"] = (1.0 / max(value, 1e-6), 1.0 / (value + z * sd), 1.0 / low, "N m/rad")
                 continue
             units = self.parameters[self.index[f"{effect}.{name}"]].units
+            known = self.effects[effect].parameters.get(name)
+            if known is not None and known.low == known.high:
+                out[name] = (known.high, known.high, known.high, units)
+                continue
             out[name] = (value, value - z * sd, value + z * sd, units)
             if name == "heating_rate":
                 low = max(value - z * sd, 1e-4)
