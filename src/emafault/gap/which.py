@@ -174,8 +174,9 @@ def _deserved(problem: Problem, ranked: list[Candidate]) -> list[Candidate]:
     for part in ranked[1:]:
         if not set(part.effects) < set(ranked[0].effects):
             continue
-        left = part.point.misfit - len(problem.cells)
-        if part.point.misfit - ranked[0].point.misfit < DESERVED * left:
+        # with the priors' part, in which a calibration effect's gap stands
+        left = part.point.objective - len(problem.cells)
+        if part.point.objective - ranked[0].point.objective < DESERVED * left:
             return [part, *(c for c in ranked if c is not part)]
     return ranked
 
