@@ -363,11 +363,12 @@ class ActuatorTwin:
         theta_0 = b.theta_0 - np.deg2rad(offset) / self.actuator.pole_pairs
         return make_runs(self.actuator, faults, effects=effects, theta_0=theta_0)
 
-    def _simulate(self, name: str, run: np.void) -> dict:
+    def _simulate(self, name: str, run: np.void, command: np.ndarray | None = None) -> dict:
         b = self._brought[name]
+        command = b.command if command is None else command
         n = len(b.recording.time)
         arrays = [np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), *(np.empty(n) for _ in range(4))]
-        run_actuator(run, b.command, b.nominal.interval, *arrays)
+        run_actuator(run, command, b.nominal.interval, *arrays)
         keys = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle")
         out = dict(zip((*keys, "output_position", "bus_voltage"), arrays, strict=True))
         out["commanded_position"] = b.signals["commanded_position"]
@@ -432,13 +433,11 @@ class ActuatorTwin:
         until = min(len(b.recording.time), int(b.jumps[0]) + max(10, round(0.015 / b.nominal.interval)))
         best = np.inf
         for part in (None, 0.0, 0.25, 0.5, 0.75, 0.9, 1.0):
-            kept, b.command = b.command, self._command(b.recording, b.jumps, part)
-            angle = self._simulate(name, run)["rotor_angle"]
+            command = self._command(b.recording, b.jumps, part)
+            angle = self._simulate(name, run, command)["rotor_angle"]
             error = float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2))
             if error < best:
-                best = error
-            else:
-                b.command = kept
+                best, b.command = error, command
 
     def _command(self, recording: Recording, jumps: np.ndarray, part: float | None = None) -> np.ndarray:
         """Command at the control ticks: linear between recorded values, but for jumps that happen at once.
@@ -558,12 +557,11 @@ class ActuatorTwin:
             if len(b.jumps):
                 # when within its interval a step came is known to a part of it only
                 part = float(np.clip(0.5 + offset / COMMAND_SCATTER * 0.3, 0.0, 1.0))
-                b.command = self._command(b.recording, b.jumps, part) + offset
-            signals = self._simulate(name, moved)
+                command = self._command(b.recording, b.jumps, part) + offset
+            signals = self._simulate(name, moved, command)
             if len(b.jumps):
                 signals["commanded_position"] = signals["commanded_position"] + offset
             repeats.append(self._as_recorded(name, moved, signals))
-        b.command = command
         return np.array(repeats)
 
     def _jitter(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
