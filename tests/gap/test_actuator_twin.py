@@ -1,6 +1,6 @@
 """The actuator's twin: statistics, exact derivatives, and a bench whose effect is named."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -153,3 +153,18 @@ def test_the_effect_of_a_bench_is_found_with_its_size(effects, named):
         point = found.candidates[0].point
         deviation = np.sqrt(point.covariance[point.free.index(m), point.free.index(m)])
         assert abs(point.values[m] - value) < 4.0 * deviation + 0.02 * abs(value)
+
+
+def test_threads_change_no_prediction(shop):
+    """Without currents at an instant a prediction is a mean over runs with commands of their own, side by side."""
+    plans = (("step", {"amplitude": 0.01, "time": 0.03}, 20.0, "unknown"), ("ramp", {"speed": 0.2}, 20.0, "unknown"))
+    recordings = {n: replace(r, phase_current_end=None) for n, r in shop.make_bench(plans=plans, duration=0.2).items()}
+    found = []
+    for threads in (1, 2):
+        twin = ActuatorTwin(ACTUATOR, recordings, NOISE, threads=threads)
+        values = np.array([p.off if p.effect else p.mean for p in twin.parameters])
+        twin.settle(values, twin.names)
+        points = np.repeat(values[None], 6, axis=0)
+        points[:, twin.index["inertia.scale"]] = np.linspace(0.9, 1.1, 6)
+        found.append(twin.predict(points, twin.names))
+    assert np.array_equal(*found)
