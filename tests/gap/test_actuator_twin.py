@@ -163,8 +163,10 @@ def test_threads_change_no_prediction(shop):
     for threads in (1, 2):
         twin = ActuatorTwin(ACTUATOR, recordings, NOISE, threads=threads)
         values = np.array([p.off if p.effect else p.mean for p in twin.parameters])
-        twin.settle(values, twin.names)
         points = np.repeat(values[None], 6, axis=0)
         points[:, twin.index["inertia.scale"]] = np.linspace(0.9, 1.1, 6)
-        found.append(twin.predict(points, twin.names))
+        twin.settle(values, twin.names)
+        commands = {name: twin._brought[name].command.copy() for name in twin.names}
+        found.append([twin.predict(points * scale, twin.names) for scale in np.linspace(1.0, 1.01, 6)])
+        assert all(np.array_equal(twin._brought[name].command, c) for name, c in commands.items())
     assert np.array_equal(*found)
