@@ -17,18 +17,13 @@ import numpy as np
 
 import emafault.actuator.kernel as kernel
 from emafault.actuator.commands import command_positions
+from emafault.actuator.compiled import OPTIONS
 from emafault.actuator.parameters import make_runs
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 
 LIMIT = 1.2
 ROUNDING = 1e-13  # differences above this would be another physics
-#: those of actuator/compiled.py
-OPTIONS = {
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": {"contract", "nsz", "arcp"},
-}
 
 
 def specialised() -> tuple[dict, int]:

@@ -126,7 +126,7 @@ def test_locked_rotor_reaches_the_steady_current_of_two_phases(fault):
     assert np.all(signals["rotor_angle"] == 0.0)
 
 
-def test_a_loop_in_two_phases_is_the_general_run(monkeypatch):
+def test_a_loop_in_two_phases_is_the_general_run():
     """The fast loop and the general segment are two writings of one physics: a supply resistance of nothing but
     rounding keeps a run out of the fast loop and must not change it."""
     for name, settings, duration in (

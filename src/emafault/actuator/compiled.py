@@ -3,6 +3,7 @@
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 _SOURCES = sorted(Path(__file__).parent.glob("*.py")) + sorted(
     (Path(__file__).resolve().parents[3] / "conf" / "effect").glob("*.yaml")
@@ -25,4 +26,5 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "emafault" / source_digest(
 import numba  # noqa: E402
 
 numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]  # type: ignore[attr-defined]
-compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+compiled = numba.njit(cache=True, **OPTIONS)

@@ -68,7 +68,7 @@ class Evidence:
     gain: float  # of the best set over the empty set, in log evidence
     null_excess: float  # largest family excess of the null fit
     excess: float  # largest family excess that the best set leaves
-    unexplained: float  # share of the null's excess misfit that the best set leaves
+    unexplained: float  # share of what the null's objective has in excess that the best set leaves
     margin: float  # gain over the best rival outside the group
     dof: int
 

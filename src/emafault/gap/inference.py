@@ -17,8 +17,8 @@ from .twin import Hypothesis, Twin
 NEAR = 20.0
 SETTLED = 1.0  # prior standard deviations that a fit within the noise may still move for its derivatives to be kept
 CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predictions must differ
-RENEWED = 4  # rounds in which they may be
-FAR = 2.0  # prior standard deviations that a round may move before noise and covariance are taken anew
+FAR = 2.0  # prior standard deviations that a round may move before noise, covariance and derivatives are taken anew
+RENEWED = 4  # rounds in which noise and covariance may be
 WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of an amplitude's prior
 NO_MOVE = 0.2  # prior standard deviations over which derivatives stay what they are
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
@@ -77,11 +77,15 @@ class Problem:
         self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
         self._base: tuple[np.ndarray, np.ndarray] | None = None  # where nuisance derivatives were taken anew, and they
 
+    def erratic(self, name: str) -> bool:
+        """Whether small changes may change a recording's statistics abruptly, as far as the twin knows."""
+        known = getattr(self.twin, "erratic", None)
+        return bool(known is not None and known(name))
+
     # ---- whitening
     def set_covariance(self, values: np.ndarray, shy: bool = False) -> None:
         """Take the statistics' covariance at a parameter point; ``shy`` all but ignores erratic recordings."""
         cov = self.twin.covariance(values, self.part)
-        erratic = getattr(self.twin, "erratic", lambda name: False)
         self._blocks = []
         for name, rows in self.rows.items():
             block = cov[np.ix_(rows, rows)]
@@ -89,7 +93,7 @@ class Problem:
             correlation = block / np.outer(scale, scale)
             # a correlation known from finitely many numbers is never trusted to the last digit
             correlation = 0.98 * correlation + 0.02 * np.eye(len(rows))
-            if shy and erratic(name):
+            if shy and self.erratic(name):
                 scale = 30.0 * scale
             self._blocks.append((rows, scale[:, None] * np.linalg.cholesky(correlation)))
 
@@ -123,16 +127,15 @@ class Problem:
             return difference
         return np.where(np.abs(difference) > CLEAR * np.sqrt(2.0 * scatter(self.part)), difference, 0.0)
 
-    def smooth(self, values: np.ndarray) -> np.ndarray | None:
-        """(statistic,) prediction averaged over a twin's own scatter; None where it has none."""
-        smooth = getattr(self.twin, "smooth", None)
-        return None if smooth is None else smooth(values, self.part)
+    @property
+    def scatters(self) -> bool:
+        """Whether the twin's predictions scatter and it can average them."""
+        return hasattr(self.twin, "smooth")
 
     def averaged(self, point: Point, chosen: Sequence[Hypothesis] = ()) -> Point:
-        """The same fit with an averaged prediction."""
+        """The same fit with a prediction averaged over the twin's own scatter."""
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
-        prediction = self.smooth(point.values)
-        assert prediction is not None
+        prediction = self.twin.smooth(point.values, self.part)  # type: ignore[attr-defined]
         return self.point(point.values, prediction, point.jacobian, point.free, widened)
 
     def nuisance_jacobian(
@@ -277,14 +280,11 @@ class Problem:
             inner = np.eye(len(free)) + information * np.outer(width, width)
             return -0.5 * (misfit + float(np.square(shift / width).sum())) - 0.5 * float(np.linalg.slogdet(inner)[1])
 
-        found = of(width)
         owners = [self.parameters[m].effect if self.parameters[m].amplitude else None for m in free]
         for effect in sorted({o for o in owners if o is not None}):
             own = np.array([o == effect for o in owners])
-            tried = [np.where(own, factor, width) for factor in WIDTHS]
-            best = max(tried, key=of)
-            width, found = best, of(best)
-        return found - len({o for o in owners if o is not None}) * float(np.log(len(WIDTHS)))
+            width = max((np.where(own, factor, width) for factor in WIDTHS), key=of)
+        return of(width) - len({o for o in owners if o is not None}) * float(np.log(len(WIDTHS)))
 
     def descend(self, best: Point, widened: Sequence[int] = (), iterations: int = 4) -> Point:
         """Gauss-Newton steps with the point's own derivatives, halved where they overshoot, until they gain nothing."""
@@ -315,9 +315,8 @@ class Problem:
         jacobian = np.zeros((0, 0))
         bounds = self.low.copy(), self.high.copy()
         unit = [m for m in self.nuisances if self.parameters[m].recordings is None]
-        erratic = getattr(self.twin, "erratic", lambda name: False)
         # where the start is far off, only the smooth recordings lead the right way
-        shy = 2 if any(map(erratic, self.part)) and not all(map(erratic, self.part)) else 0
+        shy = 2 if any(map(self.erratic, self.part)) and not all(map(self.erratic, self.part)) else 0
         first = max(1, shy)  # round with all recordings in which the fit may end
         for round_ in range(rounds):
             # the first steps are long: what belongs to the unit stays near its specification until they are done
@@ -330,6 +329,7 @@ class Problem:
                     settle(values, self.part)
                 self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
+            # derivatives of the first round serve until the fit may end, unless it has moved far from them
             if not 0 < round_ <= first or shift > FAR:
                 jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
             best = self.descend(self.point(values, prediction, jacobian, self.nuisances))

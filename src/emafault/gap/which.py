@@ -52,8 +52,7 @@ def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
     z = (problem.observed - prediction) / problem.deviations()
     groups: dict[tuple[str, str, str], list[float]] = {}
     # how exactly an actuator hunts about its target proves nothing where other recordings are there to judge by
-    erratic = getattr(problem.twin, "erratic", lambda name: False)
-    judging = [name for name in problem.part if not erratic(name)] or list(problem.part)
+    judging = [name for name in problem.part if not problem.erratic(name)] or list(problem.part)
     for cell, value in zip(problem.cells, z, strict=True):
         if cell.recording not in judging:
             continue
@@ -188,7 +187,7 @@ def _without_luck(
 
     A fit goes on where a single prediction happens to fall well, which is luck and not evidence.
     """
-    if problem.smooth(null.values) is None:
+    if not problem.scatters:
         return null, candidates
     top = candidates[0].gain
     leading = [c for c in candidates if c.gain > top - WITHIN_LUCK][:COMPARED]

@@ -81,7 +81,10 @@ _OWN: dict[str, dict[str, tuple[str, float, float]]] = {
     "self_heating": {"heating_rate": ("K/J", 0.0, 0.5)},
 }
 #: smallest realistic value of these, where it is not zero
-_LEAST = {"compliance.flexibility": 5e-5, "self_heating.heating_rate": 1.0 / 30.0}
+_LEAST = {
+    "compliance.flexibility": 1.0 / EFFECTS["compliance"].parameters["K"].high,
+    "self_heating.heating_rate": EFFECTS["self_heating"].parameters["heating_rate"].low,
+}
 
 
 @dataclass
@@ -354,14 +357,16 @@ class ActuatorTwin:
             flexibility = effects["compliance"].pop("flexibility")
             stiff = flexibility < 1e-6
             effects["compliance"]["K"] = np.where(stiff, 0.0, 1.0 / np.where(stiff, 1.0, flexibility))
-            effects["compliance"]["C"] = np.where(stiff, 300.0, effects["compliance"]["C"])
+            effects["compliance"]["C"] = np.where(stiff, self._off("compliance.C"), effects["compliance"]["C"])
         if "stribeck" in effects:  # what does nothing must not make another run of the same physics
             idle = effects["stribeck"]["a"] == 0.0
-            usual = EFFECTS["stribeck"].parameters["w_s"].nominal
-            effects["stribeck"]["w_s"] = np.where(idle, usual, effects["stribeck"]["w_s"])
+            effects["stribeck"]["w_s"] = np.where(idle, self._off("stribeck.w_s"), effects["stribeck"]["w_s"])
         offset = effects.get("angle_offset", {}).get("offset", np.zeros(len(values)))
         theta_0 = b.theta_0 - np.deg2rad(offset) / self.actuator.pole_pairs
         return make_runs(self.actuator, faults, effects=effects, theta_0=theta_0)
+
+    def _off(self, parameter: str) -> float:
+        return self.parameters[self.index[parameter]].off
 
     def _simulate(self, name: str, run: np.void, command: np.ndarray | None = None) -> dict:
         b = self._brought[name]
