@@ -29,7 +29,7 @@ ROUNDING = 1e-13  # differences above this would be another physics
 def specialised() -> tuple[dict, int]:
     """Names of the kernel compiled without effects, and how many fields were replaced."""
     folder = Path(kernel.__file__).parent
-    source = "\n".join((folder / name).read_text() for name in ("motor.py", "friction.py", "kernel.py"))
+    source = "\n".join((folder / f"{name}.py").read_text() for name in ("motor", "friction", "conduction", "kernel"))
     source = re.sub(r"^from \..*$", "", source, flags=re.MULTILINE)
     replaced = 0
     for effect in EFFECTS.values():

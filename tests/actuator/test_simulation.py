@@ -11,6 +11,8 @@ from emafault.effects import EFFECTS
 
 ACTUATOR = reference_actuator()
 HEALTHY = np.zeros((1, 6))
+#: signal -> what a straight line in place of a curve may change in it (rad/s, rad)
+BENDS = {"rotor_speed": 1e-3, "rotor_angle": 2e-6, "output_position": 2e-8}
 FAULT = np.array([[0.08, 0.03, 0.0, 0.12, -0.05, 40.0]])
 
 
@@ -126,18 +128,34 @@ def test_locked_rotor_reaches_the_steady_current_of_two_phases(fault):
     assert np.all(signals["rotor_angle"] == 0.0)
 
 
-def test_a_loop_in_two_phases_is_the_general_run():
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {"inductance_saturation": {"s": 0.02}},
+        {"cogging": {"a": 0.01}},
+        {"stribeck": {"a": 0.03, "w_s": 2.0}},
+        {"load_spring": {"c": 100.0}, "speed_latency": {"tau": 5e-4}},
+        {"dynamic_eccentricity": {"d": 0.03, "psi": 1.0}, "back_emf_shape": {"width": 115.0, "h5": 0.02, "h7": 0.01}},
+    ],
+)
+def test_a_loop_in_two_phases_is_the_general_run(effects):
     """The fast loop and the general segment are two writings of one physics: a supply resistance of nothing but
     rounding keeps a run out of the fast loop and must not change it."""
     for name, settings, duration in (
         ("parabolic", {"acceleration": 0.4}, 0.3),
         ("reversal", {"amplitude": 0.02, "speed": 0.3}, 0.3),
     ):
-        fast = simulate(make_runs(ACTUATOR, FAULT), command(name, duration, **settings), duration, 2e-4)
-        general = make_runs(ACTUATOR, FAULT, effects={"bus_resistance": {"R": np.array([1e-13])}})
+        on = {name: {k: np.array([v]) for k, v in values.items()} for name, values in effects.items()}
+        fast = simulate(make_runs(ACTUATOR, FAULT, effects=on), command(name, duration, **settings), duration, 2e-4)
+        general = make_runs(ACTUATOR, FAULT, effects=on | {"bus_resistance": {"R": np.array([1e-13])}})
         slow = simulate(general, command(name, duration, **settings), duration, 2e-4)
         for signal, values in fast.items():
-            assert values == pytest.approx(slow[signal], rel=1e-6, abs=1e-6), (name, signal)
+            # what bends within a segment is a straight line in one of them and a parabola in the other
+            exact = set(effects) <= {"inductance_saturation"}
+            if exact or signal in BENDS:
+                limit = 1e-6 if exact else BENDS[signal]
+                assert values == pytest.approx(slow[signal], rel=limit, abs=limit), (name, signal)
 
 
 @pytest.mark.parametrize("s", [0.05, 0.07])

@@ -10,53 +10,19 @@ integrals of the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be st
 import numpy as np
 
 from .compiled import compiled
+from .conduction import CURRENT_TOLERANCE, LARGEST_CHANGE, MAX_SEGMENT, NEVER, conduct_pair, crossing
 from .friction import coulomb_torque, sliding_torque, static_limit
 from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 
-NEVER = 1.0e30
-LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment
 STALLED = 1000  # segments without progress in time, after which a run is given up
 FINE = 0.1  # rad of the fastest harmonic, over which a coefficient follows three terms
+SLOW_FRICTION = 0.1  # of Stribeck's speed, over which his friction is a straight line
+SHORTEST_CHUNK = 1.0e-5  # s
 FLOATING = 0.5  # of the supply; below it the three back-EMFs together bring no floating terminal to a rail
-MAX_SEGMENT = 5.0e-5  # s; short against L/R, so that four terms are enough
-CURRENT_TOLERANCE = 1.0e-9  # A
 BUS_FILTER = 1.0e-3  # s
 COGGING_ORDER = 72.0  # lcm(slots, poles)
 MOTOR_SHARE = 0.7  # of the inertia, when the transmission is compliant
 SHAFT_DAMPING = 2.0  # N m s/rad to ground, at the user shaft of the compliant transmission
-
-
-@compiled
-def crossing(c0, c1, c2, c3, c4, h):
-    """First t in (0, h] at which c0 + c1 t + c2 t^2 + c3 t^3 + c4 t^4 changes sign; NEVER if it does not by t = h."""
-    end = c0 + h * (c1 + h * (c2 + h * (c3 + h * c4)))
-    if c0 == 0.0 or c0 * end > 0.0:
-        return NEVER
-    t = h
-    if c1 != 0.0:
-        t = -c0 / c1
-        t *= 1.0 - c2 * t / c1
-    for _ in range(6):
-        if not 0.0 <= t <= h:
-            break
-        value = c0 + t * (c1 + t * (c2 + t * (c3 + t * c4)))
-        slope = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * 4.0 * c4))
-        if slope == 0.0:
-            break
-        step = value / slope
-        t -= step
-        if abs(step) <= 1e-7 * t:  # quadratic convergence: what remains is below rounding
-            if 0.0 < t <= h:
-                return t
-            break
-    low, high = 0.0, h
-    for _ in range(60):
-        t = 0.5 * (low + high)
-        if c0 * (c0 + t * (c1 + t * (c2 + t * (c3 + t * c4)))) > 0.0:
-            low = t
-        else:
-            high = t
-    return high
 
 
 @compiled
@@ -76,82 +42,14 @@ def linkage(L, s, i):
 
 
 @compiled
-def conduct_pair(
-    i, w, high, duration, centre, band, V, R, inverse_L, K_0, dK, ddK, torque, viscous, inverse_inertia, moving,
-    limit_forward, limit_backward, lower, upper,
-):  # fmt: skip
-    """Two phases in series on the supply, switched by the comparator, until something else happens.
+def lagging(filtered, before, after, mean, h, tau):
+    """First-order lag of time constant tau (s) behind a signal that goes from ``before`` to ``after`` in h (s).
 
-    Of ``run_actuator`` this is what a run does most of the time, without the terms that are zero then.
-
-    Parameters
-    ----------
-    i, w, high : current (A), speed (rad/s), whether the pair is on +V
-    duration : how far to go (s)
-    centre, band : of the comparator, in terms of the current (A)
-    V, R, inverse_L : supply (V), resistance (ohm) and 1/inductance (1/H) of the loop
-    K_0, dK, ddK : back-EMF coefficient of the loop (V s/rad) and its derivatives by the angle
-    torque, viscous : load and, in motion, friction (N m), constant and by speed (N m s/rad)
-    inverse_inertia : 1/(kg m2), 0 at rest
-    moving : direction of motion or 0
-    limit_forward, limit_backward : torque that friction holds at rest (N m)
-    lower, upper : edges of the cell from where the rotor is (rad)
-
-    Returns
-    -------
-    number of segments, time gone (s; less than ``duration`` where the next segment would leave the cell, come to
-    rest or break away), current, speed, angle gone (rad), integral of the current (A s), whether the pair is on +V
+    It goes straight but for a bow that gives it its mean, and that counts as if it were spread evenly.
     """
-    t, area, gone, segments = 0.0, 0.0, 0.0, 0
-    top, bottom = centre + band, centre - band
-    if high and i >= top - CURRENT_TOLERANCE:
-        high = False
-    elif not high and i <= bottom + CURRENT_TOLERANCE:
-        high = True
-    while True:
-        h = duration - t
-        last = h <= MAX_SEGMENT
-        if not last:
-            h = MAX_SEGMENT
-        K, slope = K_0 + gone * (dK + 0.5 * gone * ddK), dK + gone * ddK
-        y1 = ((V if high else -V) - K * w - R * i) * inverse_L
-        a = (K * i - viscous * w - torque) * inverse_inertia
-        b = (K * y1 + w * slope * i - viscous * a) * inverse_inertia
-        y2 = (-slope * w * w - K * a - R * y1) * inverse_L
-        c = (K * y2 + slope * (2.0 * w * y1 + a * i) - viscous * b) * inverse_inertia
-        y3 = (-3.0 * slope * w * a - K * b - R * y2) * inverse_L
-        y4 = -R * y3 * inverse_L
-        y2, y3, y4 = y2 / 2.0, y3 / 6.0, y4 / 24.0
-        off = i - (top if high else bottom)
-        tripped = off * (off + h * (y1 + h * (y2 + h * (y3 + h * y4)))) < 0.0
-        if tripped:
-            inverse = 1.0 / y1
-            u, q = -off * inverse, y2 * inverse
-            u *= 1.0 - u * (q - u * (2.0 * q * q - y3 * inverse))
-            rate = y1 + u * (2.0 * y2 + u * (3.0 * y3 + u * 4.0 * y4))
-            step = (off + u * (y1 + u * (y2 + u * (y3 + u * y4)))) / rate
-            u -= step
-            # one step of Newton from the reversed series leaves less than rounding, but where the current turns round
-            if not (abs(step) <= 1e-5 * u and u <= h):
-                u = crossing(off, y1, y2, y3, y4, h)
-            h = u
-        turned = gone + h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
-        faster = w + h * (a + h * (0.5 * b + h * c / 6.0))
-        end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
-        if moving != 0:
-            if moving * faster <= 0.0 or turned >= upper or turned <= lower:
-                return segments, t, i, w, gone, area, high
-        elif max(K * i, K * end) - torque > limit_forward or torque - min(K * i, K * end) > limit_backward:
-            return segments, t, i, w, gone, area, high
-        area += h * (i + h * (y1 * 0.5 + h * (y2 / 3.0 + h * (y3 * 0.25 + h * y4 * 0.2))))
-        i = end
-        w, gone = faster, turned
-        segments += 1
-        if tripped:
-            high = not high
-        elif last:
-            return segments, duration, i, w, gone, area, high
-        t += h
+    rise, decay = (after - before) / h, np.exp(-h / tau)
+    bow = mean - 0.5 * (before + after)
+    return after - rise * tau + (filtered - before + rise * tau) * decay + bow * (1.0 - decay)
 
 
 @compiled
@@ -190,11 +88,12 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
     tau = p.speed_latency_tau
     poles = p.pole_pairs
     ratio = p.gear_ratio
-    plain = not (heated or compliant or sagging) and saturation == 0.0 and tau <= 0.0
-    plain = plain and p.cogging_a == 0.0 and p.stribeck_a == 0.0 and p.load_spring_c == 0.0
-    fastest = 0.0  # angular order of the fastest change of a back-EMF coefficient within a cell
+    plain = not (heated or compliant or sagging)
+    fastest = 0.0  # angular order of the fastest change of a torque or back-EMF coefficient within a cell
     if modulated:
         fastest = 7.0 * poles if p.back_emf_shape_h5 != 0.0 or p.back_emf_shape_h7 != 0.0 else 1.0
+    if p.cogging_a != 0.0:
+        fastest = max(fastest, 0.5 * COGGING_ORDER)  # a small part of the torque
     K, dK, ddK = np.empty(3), np.empty(3), np.zeros(3)
     free_travel = 0.9 * p.end_stop * ratio
     inertia = p.inertia * p.inertia_scale
@@ -306,7 +205,26 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             chunk = h
             if fastest * abs(w) * h > FINE:
                 chunk = FINE / (fastest * abs(w))
-            held = moving * (coulomb_forward if moving > 0 else coulomb_backward)
+            torque, stiffness, bend = p.load_constant_T / ratio, 0.0, 0.0
+            damping = viscous
+            if moving != 0:
+                coulomb = coulomb_forward if moving > 0 else coulomb_backward
+                friction, friction_slope = sliding_torque(p, coulomb, abs(w))
+                torque += moving * friction
+                if friction_slope != 0.0:
+                    damping += friction_slope
+                    torque -= friction_slope * w
+                    rate = (abs(i[plus]) * (abs(K[plus]) + abs(K[minus])) + abs(torque)) * inverse_inertia
+                    chunk = min(chunk, max(SLOW_FRICTION * p.stribeck_w_s / rate, SHORTEST_CHUNK))
+            if p.cogging_a != 0.0:
+                torque += p.cogging_a * cogging_sine
+                stiffness += p.cogging_a * COGGING_ORDER * cogging_cosine
+                bend -= p.cogging_a * COGGING_ORDER * COGGING_ORDER * cogging_sine
+            if p.load_spring_c != 0.0:
+                torque += p.load_spring_c * shaft / ratio
+                if abs((theta - p.theta_0) / ratio - moving * half_play - shaft) < 1e-12:  # the rotor takes it along
+                    stiffness += p.load_spring_c / (ratio * ratio)
+            w_before = w
             count, elapsed, end_p, w, d_theta, area_p, high = conduct_pair(
                 i[plus],
                 w,
@@ -317,11 +235,10 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 supply,
                 R[plus] + R[minus] + 2.0 * drop,
                 inverse_L_pair[off],
-                K[plus] - K[minus],
-                dK[plus] - dK[minus],
-                ddK[plus] - ddK[minus],
-                p.load_constant_T / ratio + held,
-                viscous,
+                saturation,
+                (K[plus] - K[minus], dK[plus] - dK[minus], ddK[plus] - ddK[minus]),
+                (torque, stiffness, bend),
+                damping,
                 inverse_inertia if moving != 0 else 0.0,
                 moving,
                 limit_forward,
@@ -337,6 +254,11 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             sum_Ri[plus] += R[plus] * area_p
             sum_Ri[minus] -= R[minus] * area_p
             theta += d_theta
+            if p.cogging_a != 0.0:
+                cogging_sine, cogging_cosine = np.sin(COGGING_ORDER * theta), np.cos(COGGING_ORDER * theta)
+            if tau > 0.0 and elapsed > 0.0:
+                seen = p.speed_scale_scale
+                filtered = lagging(filtered, seen * w_before, seen * w, seen * d_theta / elapsed, elapsed, tau)
             reach = (theta - p.theta_0) / ratio
             shaft = min(max(shaft, reach - half_play), reach + half_play)
             stopped_short = elapsed < chunk
@@ -405,11 +327,11 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             y1p, y1m, y1o = gammap * (xp - star), gammam * (xm - star), gammao * (xo - star)
         if saturation != 0.0:
             # the inductance, and with it the time constant, must not change much within the segment
-            fastest = max(Rp * gammap, Rm * gammam, Ro * gammao)
-            fastest = max(fastest, 2.0 * saturation * abs(ip * y1p) / (1.0 + saturation * ip * ip))
-            fastest = max(fastest, 2.0 * saturation * abs(im * y1m) / (1.0 + saturation * im * im))
-            if h * fastest > LARGEST_CHANGE:
-                h = LARGEST_CHANGE / fastest
+            rate = max(Rp * gammap, Rm * gammam, Ro * gammao)
+            rate = max(rate, 2.0 * saturation * abs(ip * y1p) / (1.0 + saturation * ip * ip))
+            rate = max(rate, 2.0 * saturation * abs(im * y1m) / (1.0 + saturation * im * im))
+            if h * rate > LARGEST_CHANGE:
+                h = LARGEST_CHANGE / rate
                 timed = False
         # ---- mechanics: driving torque, acceleration
         drive = Kp * ip + Km * im + Ko * io
@@ -611,9 +533,8 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
         if p.cogging_a != 0.0:  # not where it is used: calls up there cost a nominal run a tenth of its time
             cogging_sine, cogging_cosine = np.sin(COGGING_ORDER * theta), np.cos(COGGING_ORDER * theta)
         if tau > 0.0 and h > 0.0:
-            u0, u1 = p.speed_scale_scale * w_before, p.speed_scale_scale * w
-            rise = (u1 - u0) / h
-            filtered = u1 - rise * tau + (filtered - u0 + rise * tau) * np.exp(-h / tau)
+            seen = p.speed_scale_scale
+            filtered = lagging(filtered, seen * w_before, seen * w, seen * d_theta / h, h, tau)
         if compliant:
             shaft += h * (w_shaft + 0.5 * h * shaft_acceleration)
             w_shaft += h * shaft_acceleration
