@@ -186,8 +186,8 @@ def _wrap(x, period):
 def _put(m, n, phi, r, y, norm, count, store):
     y[m] += phi * r
     norm[m] += phi * phi
-    count[m] += 1
-    if store.shape[0] > 0:
+    if store is not None:  # decided when it is compiled
+        count[m] += 1
         store[m, n] = phi
 
 
@@ -197,8 +197,8 @@ def _put_instrument(m, n, z, phi, r, y, norm, power, count, store):
     y[m] += z * r
     norm[m] += z * phi
     power[m] += z * z
-    count[m] += 1
-    if store.shape[0] > 0:
+    if store is not None:
+        count[m] += 1
         store[m, n] = z
 
 
@@ -275,7 +275,7 @@ def fill_statistics(
     """Fill the statistics of one recording.
 
     ``c`` constants of ``Nominal``; V, i, i_end (time, phase); the rest (time,); outputs y, norm, count (statistic,),
-    residual (equation, time), store (statistic, time) regressors or (0, 0) to leave them out.
+    residual (equation, time), store (statistic, time) regressors or None to leave them and the counts out.
     """
     R, L, k, poles, J, B, T_c, ratio = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
     theta_0, Vdc, K_pos, K_p, K_i, I_max, w_max = c[8], c[9], c[10], c[11], c[12], c[13], c[14]
@@ -501,7 +501,7 @@ def fill_statistics(
             y[m + 1] -= mean * y[m]
             norm[m + 1] -= mean * cross[j]
             power[m + 1] += mean * (mean * power[m] - 2.0 * cross_power[j])
-            if store.shape[0] > 0:
+            if store is not None:
                 store[m + 1] -= mean * store[m]
     if has_bus:
         # current and power likewise, so that a supply that is merely another leaves its trace in the constant alone
@@ -509,7 +509,7 @@ def fill_statistics(
             mean = product[m - _BUS - 1] / norm[_BUS]
             y[m] -= mean * y[_BUS]
             norm[m] = max(norm[m] - mean * product[m - _BUS - 1], 1e-3 * norm[m])
-            if store.shape[0] > 0:
+            if store is not None:
                 store[m] -= mean * store[_BUS]
     for m in range(y.shape[0]):
         if norm[m] < WEAKEST_INSTRUMENT * power[m]:
@@ -533,7 +533,10 @@ def fill_statistics(
 
 @dataclass(frozen=True)
 class Computed:
-    """Statistics, norms and counts (statistic,), residuals (equation, time), regressors (statistic, time)."""
+    """Statistics, norms and counts (statistic,), residuals (equation, time), regressors (statistic, time) or (0, 0).
+
+    Counts are those of a recording whose regressors were kept.
+    """
 
     values: np.ndarray
     norm: np.ndarray
@@ -553,7 +556,6 @@ class Computed:
         return out
 
 
-_EMPTY = np.zeros((0, 0))
 _NO_BUS = np.zeros(1)
 
 
@@ -562,7 +564,7 @@ def compute(nominal: Nominal, signals: dict, keep: bool = False) -> Computed:
     n = len(signals["rotor_angle"])
     y, norm, count = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE, np.int64)
     residual = np.zeros((len(EQUATIONS), n))
-    store = np.zeros((SIZE, n)) if keep else _EMPTY
+    store = np.zeros((SIZE, n)) if keep else None
     end = signals["phase_current_end"] if nominal.has_end else signals["phase_current"]
     bus = signals["bus_voltage"] if nominal.has_bus else _NO_BUS
     fill_statistics(
@@ -570,4 +572,4 @@ def compute(nominal: Nominal, signals: dict, keep: bool = False) -> Computed:
         signals["phase_voltage"], signals["phase_current"], end, signals["rotor_speed"], signals["rotor_angle"],
         signals["output_position"], signals["commanded_position"], bus, y, norm, count, residual, store,
     )  # fmt: skip
-    return Computed(y, norm, count, residual, store)
+    return Computed(y, norm, count, residual, np.zeros((0, 0)) if store is None else store)
