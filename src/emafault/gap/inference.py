@@ -20,7 +20,7 @@ CLEAR = 2.0  # standard deviations of a twin's own scatter by which two predicti
 FAR = 2.0  # prior standard deviations that a round may move before noise, covariance and derivatives are taken anew
 RENEWED = 4  # rounds in which noise and covariance may be
 WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of an amplitude's prior
-NO_MOVE = 0.2  # prior standard deviations over which derivatives stay what they are
+NO_MOVE = 2.0, 0.3  # prior standard deviations of a nuisance and an effect over which derivatives stay as they are
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -63,6 +63,7 @@ class Problem:
         self.names = {p.name: m for m, p in enumerate(self.parameters)}
         self.mean = np.array([p.mean for p in self.parameters])
         self.sd = np.array([p.sd for p in self.parameters])
+        self.still = self.sd * np.array([NO_MOVE[0] if p.effect is None else NO_MOVE[1] for p in self.parameters])
         self.low = np.array([p.low for p in self.parameters])
         self.high = np.array([p.high for p in self.parameters])
         self.nuisances = [
@@ -75,7 +76,7 @@ class Problem:
             rows.setdefault(cell.recording, []).append(m)
         self.rows = {name: np.array(r) for name, r in rows.items()}
         self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
-        self._base: tuple[np.ndarray, np.ndarray] | None = None  # where nuisance derivatives were taken anew, and they
+        self._taken: list[tuple[np.ndarray, np.ndarray]] = []  # points where nuisance derivatives were taken, and they
 
     def erratic(self, name: str) -> bool:
         """Whether small changes may change a recording's statistics abruptly, as far as the twin knows."""
@@ -199,6 +200,15 @@ class Problem:
                     )
             whole[name] = values_of
         return np.stack([whole[self.parameters[m].name] for m in free], axis=1)
+
+    def derivatives(self, values: np.ndarray, prediction: np.ndarray) -> np.ndarray:
+        """(statistic, nuisance) derivatives at a point; those of a point hardly apart serve again."""
+        for known, jacobian in reversed(self._taken):
+            if np.max(np.abs(values - known) / self.still) < 1.0:
+                return jacobian
+        jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
+        self._taken.append((values.copy(), jacobian))
+        return jacobian
 
     # ---- fits
     def prior(self, free: Sequence[int], widened: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
@@ -331,7 +341,7 @@ class Problem:
             prediction = self.predict(values)[0]
             # derivatives of the first round serve until the fit may end, unless it has moved far from them
             if not 0 < round_ <= first or shift > FAR:
-                jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
+                jacobian = self.derivatives(values, prediction)
             best = self.descend(self.point(values, prediction, jacobian, self.nuisances))
             shift = float((np.abs(best.values - values) / self.sd)[self.nuisances].max())
             values, far = best.values, shift > FAR and round_ + 1 < RENEWED
@@ -353,7 +363,7 @@ class Problem:
             if p.effect is not None:
                 values[m] = p.off
         prediction = self.predict(values)[0]
-        jacobian = self.nuisance_jacobian(values, prediction, self.nuisances)
+        jacobian = self.derivatives(values, prediction)
         again = self.descend(self.point(values, prediction, jacobian, self.nuisances))
         return again if again.objective < null.objective else null
 
@@ -368,8 +378,7 @@ class Problem:
         self.set_covariance(candidate.point.values)
         values = candidate.point.values
         prediction = self.predict(values)[0]
-        base = self.nuisance_jacobian(values, prediction, self.nuisances)
-        self._base = values.copy(), base
+        base = self.derivatives(values, prediction)
         best = self.point(null.values, self.predict(null.values)[0], null.jacobian, self.nuisances)
         moved = self.solve(best.values, best.prediction, null.jacobian, self.nuisances)
         trial = self.point(moved, self.predict(moved)[0], null.jacobian, self.nuisances)
@@ -488,11 +497,7 @@ class Problem:
         own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
         point = candidate.point
-        known = self._base
-        if known is not None and np.max(np.abs(point.values - known[0]) / self.sd) < NO_MOVE:
-            base = known[1]
-        else:
-            base = self.nuisance_jacobian(point.values, point.prediction, self.nuisances)
+        base = self.derivatives(point.values, point.prediction)
         columns = self._effect_columns(point, own)
         jacobian = np.concatenate([base, columns], axis=1)
         start = self.point(point.values, point.prediction, jacobian, point.free, widened)

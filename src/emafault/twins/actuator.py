@@ -35,7 +35,7 @@ MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_REPEATS = 12
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
-RIPPLE_REPEATS = 4  # simulations behind a prediction where mean currents alone leave the ripple in every residual
+RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
 HUNTING = 10.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
 HUNTING_ASIDE = 25.0  # the same where enough other recordings are there to judge by
@@ -573,6 +573,8 @@ class ActuatorTwin:
         """(statistic, statistic) covariance of a single prediction by where its switching falls."""
         b = self._brought[name]
         repeats = self._repeats(name, run, shifts)
+        if b.repeats > 1:  # the first of them are the prediction of this very run
+            self._cache[name, run.tobytes()] = repeats[: b.repeats].mean(axis=0)
         apart = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
         variance = np.square(apart).sum(axis=0)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
