@@ -114,13 +114,15 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
 def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarray | None:
     """(1, log share left) of the confirm recordings' excess misfit; None where they show no gap beyond noise.
 
-    A gap that is not there before and there after the named set counts as seen.
+    A gap that is not there before and there after the named set counts as seen. What is left counts as far as it is
+    more than two standard errors, for of a gap hardly seen noise alone leaves a large share.
     """
-    threshold = 4.0 * np.sqrt(2.0 / max(size, 1)) * max(recalibrated**2, 1.0)
+    before_error, error = (np.sqrt(2.0 / max(size, 1)) * max(rms**2, 1.0) for rms in (recalibrated, after))
     visible, left = recalibrated**2 - 1.0, after**2 - 1.0
-    if max(visible, left) < threshold:
+    if max(visible, left) < 4.0 * before_error:
         return None
-    return np.array([1.0, np.log10(np.clip(max(left, 0.0) / max(visible, 0.25 * threshold), 1e-3, 10.0))])
+    share = max(left - 2.0 * error, 0.0) / max(visible, before_error)
+    return np.array([1.0, np.log10(np.clip(share, 1e-3, 10.0))])
 
 
 def _sigmoid(x: float) -> float:
