@@ -158,3 +158,14 @@ def test_rivals_from_the_key_alone(tmp_path):
     key = json.loads((tmp_path / "keys" / f"{name}.json").read_text())
     assert rival_distances(key, ["load_constant"])["load_constant"] < 6.0
     assert rival_distances(key, []) == {}
+
+
+def test_turns_shorted_in_all_phases_are_known_as_well_as_the_units_k_without_a_healthy_recording():
+    """All three alike are a smaller R, k and L: only the tolerance of k (0.5 %) tells them from the unit."""
+    case = draw_case("T1", seed_of("cogging", 10))
+    same = case.recordings[0].fault[:5]
+    plans = tuple(replace(p, health="unknown", fault=(*same, p.fault[5])) for p in case.recordings)
+    case = replace(case, recordings=plans)
+    found = Detector(case, reference_actuator(), NOISE, simulate_truth(case, reference_actuator())).detectability()
+    turns = 0.1 * np.array(found.fault_sd[0][:3])  # of the range
+    assert np.all((turns > 0.003) & (turns < 0.006))

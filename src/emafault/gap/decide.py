@@ -34,6 +34,7 @@ class Calibration:
     confirm: tuple[float, ...]  # added to the log odds of the second curve once the confirm recordings are open
     addition: float
     remainder: float  # largest family excess that an explained bench may leave
+    most: float = 1.0  # probability that a set is given at most, as far as the development cases can support one
     source: str = ""
 
     @classmethod
@@ -157,7 +158,7 @@ def decide(
     odds = float(np.dot(calibration.right, evidence.right_features()))
     if held_out is not None:
         odds += float(np.dot(calibration.confirm, held_out))
-    p_right = _sigmoid(odds)
+    p_right = calibration.most * _sigmoid(odds)
     if evidence.unexplained > MOST or (held_out is not None and held_out[1] > np.log10(MOST)):
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])

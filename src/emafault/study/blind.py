@@ -23,6 +23,7 @@ from ..withheld.benches import make_cases
 from ..withheld.cases import draw_case
 
 DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
+SURE = 0.9  # probability from which the second curve is taken at the share of its cases that were right
 PRIOR_WIDTH = 3.0  # of a coefficient about that of the uncalibrated curves
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000
@@ -105,7 +106,8 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
     """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
 
     Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case
-    held a detectable gap, the second on whether the best set was right among cases that did.
+    held a detectable gap, the second on whether the best set was right among cases that did. No set is given more than
+    the share of right ones among the cases that the second curve is sure of.
     """
     gap_rows, gap_truth, right_rows, right_truth = [], [], [], []
     for path in sorted((folder / "keys").glob("*.json")):
@@ -132,9 +134,12 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         right_truth.append(right)
     gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap))
     both = _logistic(np.array(right_rows), np.array(right_truth), np.array([*start.right, *start.confirm]))
+    sure = 1.0 / (1.0 + np.exp(-np.array(right_rows) @ np.array(both))) > SURE
+    most = (np.sum(np.array(right_truth)[sure]) + 1.0) / (sure.sum() + 2.0)  # rule of succession
     size = len(start.right)
     source = f"{len(gap_rows)} development cases for the first curve, {len(right_rows)} for the second"
-    return Calibration(tuple(gap), tuple(both[:size]), tuple(both[size:]), start.addition, start.remainder, source)
+    curves = tuple(gap), tuple(both[:size]), tuple(both[size:])
+    return Calibration(*curves, start.addition, start.remainder, round(float(most), 4), source)
 
 
 def _twins(one: set[str], other: set[str]) -> bool:

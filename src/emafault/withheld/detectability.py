@@ -95,6 +95,7 @@ class Detector:
             block = np.zeros((shifts.shape[1], len(self.prior)))
             for column, row in zip(columns, shifts[1:]):
                 block[:, column] = row / self._step(column, soak)
+            self._cancel(m, block)
             self.views.append(view)
             self.base.append(base)
             blocks.append(block)
@@ -106,6 +107,30 @@ class Detector:
         self.repeat = self.squared(np.concatenate(repeats))
         self.nominal: float | None = None
         self.lattice = LATTICE if "speed_quantisation" in case.effects else 0.0
+
+    def _cancel(self, m: int, block: np.ndarray) -> None:
+        """Derivative by k from those by R, L and the turns, in place, where a recording's turns are free.
+
+        Turns shorted in all phases alike are a smaller R, k and L (twice): what cancels in truth must cancel here too,
+        or the scatter of differences would tell a common short from a unit's tolerance.
+        """
+        turns = self.fault_columns[m][:-1][:3]
+        if not turns:
+            return
+        at = {(effect, name): column for column, (effect, name, _) in enumerate(self.tolerances)}
+
+        def by(effect: str, name: str) -> tuple[int, float]:
+            """Column of a tolerance and its value in units of it."""
+            column = at[effect, name]
+            return column, self.unit[effect][name] / self.tolerances[column][2]
+
+        R, of_R = by("unit_calibration", "R_scale")
+        k, of_k = by("unit_calibration", "k_scale")
+        L, of_L = by("inductance_tolerance", "L_scale")
+        total = -of_R * block[:, R] - 2.0 * of_L * block[:, L]
+        for column, N in zip(turns, self.case.recordings[m].fault[:3]):
+            total -= (1.0 - N) / self.prior[column] * block[:, column]
+        block[:, k] = total / of_k
 
     def _step(self, column: int, soak: int) -> float:
         """Finite-difference step of a nuisance, in prior standard deviations."""
