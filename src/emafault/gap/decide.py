@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .how_far import square_error
 from .inference import Candidate, Problem
 from .which import Search, far_outside, groups
 
@@ -118,11 +119,11 @@ def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarra
     A gap that is not there before and there after the named set counts as seen. What is left counts as far as it is
     more than two standard errors, for of a gap hardly seen noise alone leaves a large share.
     """
-    before_error, error = (np.sqrt(2.0 / max(size, 1)) * max(rms**2, 1.0) for rms in (recalibrated, after))
     visible, left = recalibrated**2 - 1.0, after**2 - 1.0
-    if max(visible, left) < 4.0 * before_error:
+    error, error_left = square_error(recalibrated, size), square_error(after, size)
+    if visible < 4.0 * error and left < 4.0 * error_left:
         return None
-    share = max(left - 2.0 * error, 0.0) / max(visible, before_error)
+    share = max(left - 2.0 * error_left, 0.0) / max(visible, error)
     return np.array([1.0, np.log10(np.clip(share, 1e-3, 10.0))])
 
 

@@ -65,6 +65,11 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     return {"outcome": outcome, "claimed": list(claimed), "rivals": listed}
 
 
+def contested(diagnosis: Diagnosis) -> bool:
+    """Whether the named set leaves enough of the confirm recordings for a rival to be preferred."""
+    return diagnosis.ladder is not None and diagnosis.ladder.after.rms > VISIBLE
+
+
 def claim(diagnosis: Diagnosis, outcome: dict) -> None:
     """Let the confirm recordings decide what a verdict claims.
 

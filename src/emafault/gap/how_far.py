@@ -90,11 +90,18 @@ def placebo(
     return float(np.median(out))
 
 
+def square_error(rms: float, size: int) -> float:
+    """Standard error of the mean square of ``size`` residuals of unit noise about what a wrong model leaves.
+
+    Of the non-central chi-square distribution: sqrt((4 rms^2 - 2)/n), or sqrt(2/n) where nothing is left.
+    """
+    return float(np.sqrt((4.0 * max(rms, 1.0) ** 2 - 2.0) / max(size, 1)))
+
+
 def closed(recalibrated: float, after: float, floor: float, size: int) -> float | None:
     """Share of the closable gap that is closed; None where the closable gap is below twice its standard error."""
     closable = recalibrated**2 - floor**2
-    error = recalibrated**2 * np.sqrt(2.0 / max(size, 1))
-    if closable < 2.0 * error:
+    if closable < 2.0 * square_error(recalibrated, size):
         return None
     return float((recalibrated**2 - after**2) / closable)
 

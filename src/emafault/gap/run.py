@@ -131,7 +131,8 @@ def diagnose_recordings(
     noise : of the sensors, where the recordings do not tell it
     calibration : frozen curves of probability; None takes those of the project
     threads : simulations run side by side
-    whole : with the ladder in features, the next experiments and the pictures; a withheld check needs none of them
+    whole : with the rivals on the confirm recordings even where none can win, the next experiments and the pictures; a
+        withheld check needs none of them
 
     Raises
     ------
@@ -142,7 +143,7 @@ def diagnose_recordings(
     from ..twins.actuator_features import feature_ladder
     from ..twins.actuator_pictures import worst_region
     from .handover import experiment_text
-    from .held_out import claim, held_out
+    from .held_out import claim, contested, held_out
     from .next_experiment import next_experiments
 
     for effect in exclude:
@@ -155,11 +156,12 @@ def diagnose_recordings(
     found = diagnose(twin, bench.name, explore, confirm, calibration or Calibration.load(), truths)
     verdict = found.verdict
     verdict["warnings"] = bench.warnings
+    verdict["shrinks"]["features"] = feature_ladder(found)
+    if whole or contested(found):
+        verdict["held_out"] = held_out(found, RIVALS)
+        claim(found, verdict["held_out"])
     if not whole:
         return Diagnosed(found, truths)
-    verdict["held_out"] = held_out(found, RIVALS)
-    claim(found, verdict["held_out"])
-    verdict["shrinks"]["features"] = feature_ladder(found)
     verdict["next_experiment"] = next_experiments(found, actuator_experiments)
     named = verdict["verdict"] in ("explained", "group", "partly")
     best = found.found.candidates[0] if named else None
