@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from emafault.errors import InputError
-from emafault.twins.library import MEASURED, build_twin, distortions, measured_twins, read_cases
+from emafault.twins.library import MEASURED, bench, build_twin, distortions, measured_twins, read_cases
 from emafault.twins.measured import MeasuredTwin, mean_variance, smooth_covariance
 from emafault.twins.slow_rotation import find_pole_pairs_and_slots
 
@@ -233,6 +233,35 @@ def test_a_repetition_that_contradicts_the_others_shows_on_the_held_out_part():
         nominal = Fit(twin).values
         values = Fit(twin, (effect,)).values
         assert (rms(twin, values, twin.confirm) > rms(twin, nominal, twin.confirm)) == worse
+
+
+@pytest.mark.parametrize(("name", "file"), ALL)
+def test_every_machine_has_recordings_that_could_be_made_next(name, file):
+    for twin in twins(name, file).values():
+        laboratory = bench(twin)
+        menu = laboratory.menu()
+        assert len({e.text for e in menu}) == len(menu) >= 2
+        values = np.array([p.off if p.effect else p.mean for p in twin.parameters])
+        imagined = laboratory.imagine(twin, values, (), menu)
+        predicted = [imagined.predict(values[None], [str(n)])[0] for n in range(len(menu))]
+        assert np.isfinite(predicted).all()
+        np.testing.assert_array_equal(predicted[0], twin.predict(values[None], twin.explore[:1])[0])
+
+
+def test_moved_probes_tell_a_channels_gain_from_a_phases_k():
+    """At open circuit the two leave the same trace; with the probes moved on by one phase they no longer do."""
+    twin = first("back_emf")
+    names = [p.name for p in twin.parameters]
+    off = np.array([p.off if p.effect else p.mean for p in twin.parameters])
+    gain, k = off.copy(), off.copy()
+    k[names.index("k_c")] = 0.02
+    gain[names.index("decades_c")] = np.log10(1.02)
+    laboratory = bench(twin)
+    menu = laboratory.menu()
+    moved = str([e.text for e in menu].index("the same speed with every probe moved on by one phase"))
+    imagined = laboratory.imagine(twin, off, (), menu)
+    same, apart = (np.ptp(imagined.predict(np.stack([gain, k]), [n]), axis=0).max() for n in ("0", moved))
+    assert same < 1e-3 < 0.019 < apart
 
 
 def test_an_effect_can_be_taken_out_of_the_library():

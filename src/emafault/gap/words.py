@@ -145,7 +145,8 @@ def summary(verdict: Mapping[str, Any]) -> str:
         if entry["kind"] == "set aside":
             lines.append(f"  {entry['message']}")
     for entry in verdict["next_experiment"][:1]:
-        lines.append(f"  next: {entry['command']}, at {entry['ambient_temperature']:g} degC")
+        ambient = entry["ambient_temperature"]
+        lines.append(f"  next: {entry['command']}" + ("" if ambient is None else f", at {ambient:g} degC"))
     return "\n".join(lines)
 
 

@@ -169,6 +169,10 @@ def _section(page, name: str, case: str, diagnosis: Diagnosis, draw_residuals, d
                 for r in verdict["reconstructed"]
             ],
         )  # fmt: skip
+    if verdict["next_experiment"]:
+        entry = verdict["next_experiment"][0]
+        told = " from ".join(name.replace("_", " ").replace("+", " + ") for name in entry["separates"])
+        page.paragraph(f"To record next: {entry['command']}. It would tell {told}.")
     untold = [" or ".join(g) for g in verdict["groups"]]
     untold += [" and ".join(c["effects"]) for c in verdict["confusable"] if c["cosine"] > 0.99][:8]
     if untold:

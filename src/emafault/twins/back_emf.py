@@ -26,6 +26,7 @@ from emafault.twins.measured import (
     read_arrays,
     require_finite,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "back_emf"
 ORDERS = 13  # highest harmonic
@@ -179,6 +180,7 @@ def _block(name: str, arrays: Arrays, f: float, c: np.ndarray, omega: float) -> 
                 phase.append(channel)
                 part.append(k)
     inputs = {"order": np.array(order), "phase": np.array(phase), "part": np.array(part)}
+    inputs["channel"] = inputs["phase"]  # the one that shows the phase
     inputs |= {"w": np.full(len(order), omega), "sequence": np.full(len(order), sequence)}
     return Block(cells, np.array(observed), np.diag(variance), inputs)
 
@@ -215,9 +217,9 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     zero = np.zeros_like(amplitude)
     log_gain, k, angle, offset = zero, zero + 1, zero, zero
     for number, c in enumerate("abc"):
-        here = (phase == number).astype(float)
-        log_gain = log_gain + here * np.log(10.0) * p[f"decades_{c}"]
-        offset = offset + here * p[f"offset_{c}"]
+        here, shown = (phase == number).astype(float), (x["channel"] == number).astype(float)
+        log_gain = log_gain + shown * np.log(10.0) * p[f"decades_{c}"]
+        offset = offset + shown * p[f"offset_{c}"]
         if number:
             k = k + here * p[f"k_{c}"]
             angle = angle + here * p[f"angle_{c}"]
@@ -231,6 +233,20 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     value = np.where(order == 0, offset / (k * amplitude), value)
     first = np.where(part == 0, np.log(k * amplitude) + log_gain, angle)
     return np.where(order == 1, first, value)
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Other speeds, and probes moved on by one phase: a gain follows its channel, a k its phase."""
+
+    def moved(x: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        return {"channel": (x["channel"] + 1) % 3}
+
+    return (
+        Experiment("the same speed with every probe moved on by one phase", moved),
+        scaled("a tenth of the speed", w=0.1),
+        scaled("four times the speed", w=4.0),
+        scaled("turned the other way", sequence=-1.0),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -7,9 +7,10 @@ from pathlib import Path
 from emafault.gap.decide import Calibration
 from emafault.gap.diagnose import INTERVAL, Diagnosis, diagnose
 from emafault.gap.held_out import claim, held_out
+from emafault.gap.next_experiment import next_experiments
 from emafault.gap.where import equation_of
 from emafault.gap.which import confusability
-from emafault.twins.library import build_twin, distortions, read_cases
+from emafault.twins.library import bench, build_twin, distortions, read_cases
 from emafault.twins.measured import Arrays, MeasuredTwin
 from emafault.twins.reconstructed import reconstruct_measured
 
@@ -41,7 +42,9 @@ def diagnose_cases(
     """
     found = {}
     for case, arrays in read_cases(name, path).items():
-        found[case] = diagnose_twin(build_twin(name, case, arrays), calibration)
+        twin = build_twin(name, case, arrays)
+        found[case] = diagnose_twin(twin, calibration)
+        found[case].verdict["next_experiment"] = next_experiments(found[case], bench(twin))
         features = reconstruct_measured(name, arrays, (nameplate or {}).get(case))
         found[case].verdict["reconstructed"] = [
             asdict(f) | {"bias": {reference: f.bias(reference) for reference in f.references}} for f in features

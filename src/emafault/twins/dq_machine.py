@@ -26,6 +26,7 @@ from emafault.twins.measured import (
     require_finite,
     smooth_covariance,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "dq_machine"
 COLUMNS = ("u_d", "u_q", "i_d", "i_q", "motor_speed", "torque", "pm", "stator_winding")
@@ -215,6 +216,23 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     gain = (1 + p["gain_T"]) * (1 + p["gain_map"]) * (1 + p["drift_T"] * x["elapsed"])
     torque = 1.5 * (flux_torque * i_qt - flux_q_t * i_dt) * gain - p["T_iron"] * np.sign(w)
     return np.concatenate([u_d * growth, u_q * growth, torque], axis=1)
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Conditions that take apart what one speed and one load leave together."""
+
+    def pulse(x: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        return {"magnet": np.full_like(x["magnet"], x["magnet"].min())}
+
+    return (
+        scaled("the same currents at a third of the speed", w=1.0 / 3.0),
+        scaled("the same currents at standstill", w=1e-3),
+        scaled("the same speed without current", i_d=0.0, i_q=0.0),
+        scaled("the same speed and i_q, i_d half as large", i_d=0.5),
+        scaled("the same speed and i_d, i_q reversed", i_q=-1.0),
+        Experiment("the same load in short pulses: winding hot, magnets cold", pulse),
+        scaled("the same load on a machine at 20 degC", winding=0.0, magnet=0.0),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

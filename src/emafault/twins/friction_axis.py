@@ -25,6 +25,7 @@ from emafault.twins.measured import (
     read_arrays,
     require_finite,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "friction_axis"
 ACCURACY = 0.002  # of the largest force in a mean over one bin
@@ -134,6 +135,7 @@ def _block(name: str, x: Arrays, scale: Mapping[str, float], middle: float) -> B
     inputs |= {key: np.array([values[rows].mean() for rows in rows_of]) for key, values in derived.items()}
     inputs["q"] = inputs["q"] - middle
     inputs["samples"] = np.array([x["v"][rows] for rows in picks])
+    inputs["v_max"] = np.array([scale["v"]])
     variance = [mean_variance(x["F"][rows]) for rows in rows_of]
     covariance = np.diag(np.array(variance) + (ACCURACY * scale["F"]) ** 2)
     return Block(cells, np.array([x["F"][rows].mean() for rows in rows_of]), covariance, inputs)
@@ -174,10 +176,21 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     force = force + p["F_vv"] * x["square"] + p["c"] * x["q"] + p["F_q"] * x["place"]
     force = force + p["F_t"] * x["drift"] + p["F_0t"] * x["t"] + p["mu"] * x["push"]
     if np.any(p["F_s"] != 0):
-        v_s = np.exp(p["log_v_s"])[..., None] * np.abs(x["samples"]).max()
+        v_s = np.exp(p["log_v_s"])[..., None] * x["v_max"]
         bump = (np.exp(-((x["samples"] / v_s) ** 2)) * np.sign(x["samples"])).mean(axis=-1)
         force = force + p["F_s"] * bump
     return force
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Other speeds, pushes and lengths."""
+    slow = {"v": 0.1, "speed": 0.1, "samples": 0.1, "square": 0.01, "a": 0.01, "push": 0.01}
+    return (
+        scaled("the same strokes ten times slower", **slow),
+        scaled("the same speeds with a third of the acceleration", a=1.0 / 3.0, push=1.0 / 3.0),
+        scaled("ten times as long", t=10.0, drift=10.0),
+        scaled("the same speeds on a tenth of the stroke", q=0.1, place=0.1),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -26,6 +26,7 @@ from emafault.twins.measured import (
     read_arrays,
     require_finite,
 )
+from emafault.twins.measured_experiments import Experiment
 
 NAME = "induction_currents"
 RATE = 1000.0  # Hz
@@ -154,6 +155,8 @@ def _block(name: str, i: np.ndarray, order: float, unbalance: complex, spread: f
     # unbalance changes from recording to recording: one error shared by all windows of a repetition
     shared = np.kron(np.eye(4), np.full((len(s), len(s)), min(spread, 2 * REPEATABILITY) ** 2))
     inputs = {"kind": np.array(kind), "order": np.full(len(kind), order)}
+    # by how many phases probes and supply leads have been moved on against the windings
+    inputs |= {"probe": np.array([0]), "lead": np.array([0])}
     return Block(cells, values.T.ravel(), shared + np.diag(variance + STEADINESS**2), inputs)
 
 
@@ -192,18 +195,28 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     base = [one * turn ** (-n) for n in range(3)]
     current = [c.copy() for c in base]
     unbalance = p["u_re"] + p["supply_re"] + 1j * (p["u_im"] + p["supply_im"])
+    unbalance = unbalance * turn ** (2 * x["lead"][0])
     for n, c in enumerate("abc"):
         current[n] = current[n] + unbalance * turn**n
         short = p[f"d_{c}"] * np.exp(1j * p[f"gamma_{c}"]) * base[n]
         for m in range(3):
             current[m] = current[m] + (short if m == n else -0.5 * short)
     zero = p["z_re"] + 1j * p["z_im"]
-    current = [(i + zero) * (1 + p[f"gain_{c}"]) for i, c in zip(current, "abc")]
+    gains = [1 + p[f"gain_{'abc'[(n + x['probe'][0]) % 3]}"] for n in range(3)]
+    current = [(i + zero) * gain for i, gain in zip(current, gains)]
     first = sum(i * turn**n for n, i in enumerate(current)) / 3
     second = sum(i * turn ** (-n) for n, i in enumerate(current)) / 3 / first
     zeroth = sum(current) / 3 / first
     parts = (second.real, second.imag, zeroth.real, zeroth.imag)
     return np.choose(x["kind"], [part + np.zeros(x["kind"].shape) for part in parts])
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """A gain follows its channel, an unbalance the supply, a short the winding."""
+    return (
+        Experiment("every current probe moved on by one phase", lambda x: {"probe": x["probe"] + 1}),
+        Experiment("every supply lead moved on by one phase", lambda x: {"lead": x["lead"] + 1}),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from emafault.errors import InputError
 from emafault.twins.measured import Arrays, Distortion, MeasuredTwin
+from emafault.twins.measured_experiments import Bench
 
 MEASURED = (
     "dq_machine",
@@ -66,6 +67,11 @@ def build_twin(name: str, case: str, arrays: Arrays) -> MeasuredTwin:
 def measured_twins(name: str, path: Path) -> dict[str, MeasuredTwin]:
     """The twin of each case of a file."""
     return {case: build_twin(name, case, arrays) for case, arrays in read_cases(name, path).items()}
+
+
+def bench(twin: MeasuredTwin) -> Bench:
+    """What could be recorded next of a machine."""
+    return Bench(twin, _module(twin.name).experiments())
 
 
 def distortions(name: str) -> tuple[Distortion, ...]:

@@ -23,6 +23,7 @@ from emafault.twins.measured import (
     require_finite,
     to_numbers,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "propeller_sweep"
 COLUMNS = ("propeller", "pack", "esc_us", "v_bus_V", "i_bus_A", "speed_rpm")
@@ -143,6 +144,16 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     voltage = p["k"] * (1 - p["weakening"] * heat) * w + p["R"] * (1 + p["heating"] * heat) * i
     voltage = voltage + p["L_commutation"] * w * i + p["V_drop"]
     return voltage * (1 + p["gain_v"]) + p["V_offset"] + p["V_limit"] * x["limit"]
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Loads that take apart speed and current, which a propeller ties together."""
+    return (
+        scaled("full throttle without propeller", i=0.1),
+        scaled("full throttle with half the load at the same speed", i=0.5),
+        scaled("the same currents at a third of the voltage, with a larger propeller", w=1.0 / 3.0),
+        scaled("the same currents with the rotor locked", w=0.0),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -31,6 +31,7 @@ from emafault.twins.measured import (
     smooth_covariance,
     to_numbers,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "six_step_bus"
 FORMS = {
@@ -307,6 +308,18 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     ):
         result = np.where(kind == names.index(name), values, result)
     return result
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Conditions that take apart what a propeller ties together."""
+    return (
+        scaled("the same steps on a cold machine, a second each", heat=0.0),
+        scaled("the same steps, each twice as long", heat=1.5),
+        scaled("the same currents with the rotor locked", w=0.0, heat=1.0),
+        scaled("the same speeds without propeller", i=0.1, bus=0.1, T=0.1, heat=0.01),
+        scaled("the same speeds with half the load", i=0.5, bus=0.5, T=0.5, heat=0.25),
+        scaled("steps up and down, watched from the edge on", rise=3.0),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:

@@ -27,6 +27,7 @@ from emafault.twins.measured import (
     require_finite,
     smooth_covariance,
 )
+from emafault.twins.measured_experiments import Experiment, scaled
 
 NAME = "slow_rotation"
 BINS = 128  # of one turn
@@ -236,6 +237,16 @@ def _model(
     if second <= ORDERS:
         current = current * (1 + p["current_gain_cos"] * x["cos"][second] + p["current_gain_sin"] * x["sin"][second])
     return current
+
+
+def experiments() -> tuple[Experiment, ...]:
+    """Other directions and speeds."""
+    return (
+        scaled("the same in the other direction", direction=-1.0, v=-1.0),
+        scaled("ten times slower", v=0.1, a=0.01),
+        scaled("ten times faster", v=10.0, a=100.0),
+        scaled("fast to and fro about the same places", a=100.0),
+    )
 
 
 def distortions() -> tuple[Distortion, ...]:
