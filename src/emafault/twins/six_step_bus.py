@@ -239,11 +239,11 @@ def _parameters(scale: Mapping[str, float]) -> tuple[Parameter, ...]:
         freedom("saturation", "saturation", "1/A", 0.1 * inverse, 0.0, 0.8 * inverse),
         freedom("no_load_torque", "T_0", "N m", 0.05 * T, 0.0, 0.5 * T),
         freedom("no_load_torque", "b", "N m s/rad", 0.1 * T / scale["w"], 0.0, T / scale["w"]),
-        freedom("torque_gain", "gain_T", "1", 0.1, -0.5, 0.5),
-        freedom("voltage_gain_first", "gain_v", "1", 0.05, -0.4, 0.4),
-        freedom("voltage_gain_second", "gain_v2", "1", 0.05, -0.4, 0.4),
-        freedom("current_gain_first", "gain_i", "1", 0.15, -0.6, 0.6),
-        freedom("current_gain_second", "gain_i2", "1", 0.15, -0.6, 0.6),
+        freedom("torque_gain", "log_gain_T", "1", 0.1, -1.2, 1.2),
+        freedom("voltage_gain_first", "log_gain_v", "1", 0.05, -1.2, 1.2),
+        freedom("voltage_gain_second", "log_gain_v2", "1", 0.05, -1.2, 1.2),
+        freedom("current_gain_first", "log_gain_i", "1", 0.15, -1.2, 1.2),
+        freedom("current_gain_second", "log_gain_i2", "1", 0.15, -1.2, 1.2),
         freedom("lead_resistance", "R_lead", "ohm", 0.02, 0.0, 0.2),
         freedom("current_lag", "lag", "s", 0.2, 0.0, 1.0),
     )  # fmt: skip
@@ -280,25 +280,25 @@ def _model(p: Mapping[str, np.ndarray], block: Block) -> np.ndarray:
     x = block.inputs
     w, D, kind = x["w"], x["D"], x["kind"]
     names = list(ACCURACY)
-    true_bus = x["bus"] / (1 + p["gain_i"])
-    true_v = x["v"] / (1 + p["gain_v"])
+    true_bus = x["bus"] / np.exp(p["log_gain_i"])
+    true_v = x["v"] / np.exp(p["log_gain_v"])
     k = p["k"] * (1 - p["weakening"] * _at_tau(x["heat"], p["log_tau_m"]))
     drag = p["T_0"] + p["b"] * w
-    i = np.where(np.isfinite(x["i"]), x["i"], 0.0) / (1 + p["gain_i"])
+    i = np.where(np.isfinite(x["i"]), x["i"], 0.0) / np.exp(p["log_gain_i"])
     rise = 1 + p["heating"] * _at_tau(x["heat"], p["log_tau"])
     R = p["R"] * rise
     k = k * (1 - p["saturation"] * i)
     electrical = k * w + R * i + (p["L_commutation"] - p["advance"]) * w * i + p["V_drop"] + (1 - D) * p["V_diode"]
     # the bridge cannot be on for longer than always, whatever its timer adds
     added = np.clip(D + p["duty_offset"], 0, 1) - D
-    electrical = electrical * (1 + p["gain_v"]) - added * x["v"]
-    torque = (1 + p["gain_T"]) * (k * i - drag)
-    second_voltage = (1 + p["gain_v2"]) * (true_v + p["R_lead"] * true_bus)
-    second_current = (1 + p["gain_i2"]) * (true_bus - p["lag"] * x["rise"] / (1 + p["gain_i"]))
+    electrical = electrical * np.exp(p["log_gain_v"]) - added * x["v"]
+    torque = np.exp(p["log_gain_T"]) * (k * i - drag)
+    second_voltage = np.exp(p["log_gain_v2"]) * (true_v + p["R_lead"] * true_bus)
+    second_current = np.exp(p["log_gain_i2"]) * (true_bus - p["lag"] * x["rise"] / np.exp(p["log_gain_i"]))
     # what the instruments call losses: their own power less the torque they show
-    true_torque = x["T"] / (1 + p["gain_T"])
+    true_torque = x["T"] / np.exp(p["log_gain_T"])
     true_power = p["R_k2"] * rise * (true_torque + drag) ** 2 + (true_torque + drag) * w
-    bus = true_power * (1 + p["gain_v"]) * (1 + p["gain_i"]) - x["T"] * w
+    bus = true_power * np.exp(p["log_gain_v"]) * np.exp(p["log_gain_i"]) - x["T"] * w
     result = np.where(kind == names.index("electrical"), electrical, 0.0)
     for name, values in (
         ("torque", torque),
