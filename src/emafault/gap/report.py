@@ -14,7 +14,7 @@ from .diagnose import Diagnosis
 from .inference import Problem
 from .retrained import MARKS
 from .which import Family
-from .words import cannot_tell, consequence, effect_words, finding, number
+from .words import cannot_tell, consequence, effect_words, finding, interval, number
 
 NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
@@ -226,8 +226,8 @@ def _which(page: Page, diagnosis: Diagnosis) -> None:
         if entry.get("parameters") and (entry["probability"] > 1e-3 or entry is verdict["which"][0]):
             for name, p in entry["parameters"].items():
                 units = "" if p["units"] == "1" else p["units"]
-                interval = f"{number(p['low'])} to {number(p['high'])}"
-                rows.append([effect_words([p["effect"]]), name, number(p["value"]), interval, units])
+                value, low, high = interval(p)
+                rows.append([effect_words([p["effect"]]), name, value, f"{low} to {high}", units])
     if rows:
         page.table(["effect", "parameter", "value", "90 % interval", "unit"], rows[:TABLED])
     if len(rows) > TABLED:

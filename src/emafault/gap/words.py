@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 #: excess of a family from which "clearly" is said
 _CLEAR = 10.0
 MOST = 3  # parameters named in a sentence
@@ -14,9 +16,18 @@ def effect_words(effects: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "nothing"
 
 
-def number(value: float) -> str:
-    """A value to three digits."""
-    return f"{value:.3g}"
+def number(value: float, width: float = 0.0) -> str:
+    """A value to three digits, or to two of the ``width`` that it is known to where those are more."""
+    digits = 3
+    if value and 0.0 < width < abs(value):
+        digits = max(digits, int(np.floor(np.log10(abs(value))) - np.floor(np.log10(width))) + 2)
+    return f"{value:.{digits}g}"
+
+
+def interval(p: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Value, lower and upper bound of a fitted parameter."""
+    width = p["high"] - p["low"]
+    return number(p["value"], width), number(p["low"], width), number(p["high"], width)
 
 
 def parameter_words(parameters: Mapping[str, Mapping[str, Any]]) -> str:
@@ -24,7 +35,8 @@ def parameter_words(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     parts = []
     for name, p in list(parameters.items())[:MOST]:
         units = "" if p["units"] == "1" else f" {p['units']}"
-        parts.append(f"{name} = {number(p['value'])}{units} ({number(p['low'])} to {number(p['high'])})")
+        value, low, high = interval(p)
+        parts.append(f"{name} = {value}{units} ({low} to {high})")
     more = len(parameters) - MOST
     return ", ".join(parts) + (f" and {more} more" if more > 0 else "")
 
