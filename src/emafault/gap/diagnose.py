@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .decide import Calibration, Decision, decide, held_out_features, is_named
-from .how_far import Ladder, climb, closed
+from .how_far import Ladder, Rung, climb, closed
 from .inference import Candidate, Point, Problem
 from .twin import INTERVAL, Twin
 from .where import equation_of, where
@@ -89,8 +89,8 @@ def diagnose(
         "candidates": [[list(c.effects), round(c.gain, 2)] for c in found.candidates[:6]],
     }
     mixture = _mixture(problem, found, decision, best)
-    before_faults = fault_vectors(problem, found.null, (ladder.problem, ladder.recalibrated.values) if ladder else None)
-    after_faults = fault_vectors(problem, after, (ladder.problem, ladder.after.values) if ladder else None, mixture)
+    before_faults = fault_vectors(problem, found.null, (ladder.problem, ladder.recalibrated) if ladder else None)
+    after_faults = fault_vectors(problem, after, (ladder.problem, ladder.after) if ladder else None, mixture)
     verdict["fault_vector"] = {
         name: {"before": before_faults[name], "after": after_faults[name]} for name in before_faults
     }
@@ -187,7 +187,7 @@ def _mixture(problem: Problem, found: Search, decision: Decision, best: Candidat
 def fault_vectors(
     problem: Problem,
     point: Point,
-    confirm: tuple[Problem, np.ndarray] | None,
+    confirm: tuple[Problem, Rung] | None,
     mixture: Sequence[tuple[Point, float]] = (),
 ) -> dict[str, dict]:
     """Recording -> fault component -> value with 90 % interval, widened by what else is believable."""
@@ -211,13 +211,15 @@ def fault_vectors(
         if problem.parameters[m].fault is not None:
             add(m, point.values[m], float(np.hypot(sd, np.sqrt(spread[m]))))
     if confirm is not None:
-        other, values = confirm
+        other, rung = confirm
         for m in other.nuisances:
             p = problem.parameters[m]
             if p.fault is None or m in deviation:
                 continue
+            # what the unit's own uncertainty brings, as in the explored recordings, and what this recording leaves
             typical = [sd for k, sd in deviation.items() if problem.parameters[k].fault == p.fault]
-            add(m, values[m], float(np.median(typical)) if typical else p.sd)
+            common = float(np.median(typical)) if typical else 0.0
+            add(m, rung.values[m], float(np.hypot(common, rung.deviations.get(m, p.sd))))
     return out
 
 

@@ -1,7 +1,7 @@
 """How far the gap shrinks on recordings that took no part in fitting or choosing."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,7 @@ class Rung:
     rms: float
     values: np.ndarray
     residual: np.ndarray  # (statistic,) whitened
+    deviations: Mapping[int, float] = field(default_factory=dict)  # of the parameters refitted here, all else known
 
 
 def own_nuisances(problem: Problem) -> list[int]:
@@ -33,7 +34,7 @@ def own_nuisances(problem: Problem) -> list[int]:
 def refit(problem: Problem, values: np.ndarray, free: Sequence[int]) -> Rung:
     """Refit only ``free`` on the problem's recordings and return the residual; all else stays as it is."""
     prediction = problem.predict(values)[0]
-    jacobian = np.zeros((len(problem.cells), 0))
+    deviations: dict[int, float] = {}
     if free:
         jacobian = problem.nuisance_jacobian(values, prediction, free, exact=False)
         for _ in range(2):
@@ -43,8 +44,11 @@ def refit(problem: Problem, values: np.ndarray, free: Sequence[int]) -> Rung:
             if new >= old:
                 break
             values, prediction = moved, trial
+        whitened, (_, sd) = problem.whiten(jacobian), problem.prior(free)
+        covariance = np.linalg.inv(whitened.T @ whitened + np.diag(1.0 / sd**2))
+        deviations = dict(zip(free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     residual = problem.whiten(problem.observed - prediction)
-    return Rung(float(np.sqrt(np.mean(residual**2))), values, residual)
+    return Rung(float(np.sqrt(np.mean(residual**2))), values, residual, deviations)
 
 
 def without_tolerance(explore: Problem, null: Point) -> np.ndarray:
