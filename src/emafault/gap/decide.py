@@ -32,7 +32,6 @@ class Calibration:
 
     gap: tuple[float, ...]
     right: tuple[float, ...]
-    confirm: tuple[float, ...]  # added to the log odds of the second curve once the confirm recordings are open
     addition: float
     remainder: float  # largest family excess that an explained bench may leave
     most: float = 1.0  # probability that a set is given at most, as far as the development cases can support one
@@ -157,8 +156,6 @@ def decide(
         unknown = p_gap
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
     odds = float(np.dot(calibration.right, evidence.right_features()))
-    if held_out is not None:
-        odds += float(np.dot(calibration.confirm, held_out))
     p_right = calibration.most * _sigmoid(odds)
     if evidence.unexplained > MOST or (held_out is not None and held_out[1] > np.log10(MOST)):
         p_right = min(p_right, WITHDRAWN)

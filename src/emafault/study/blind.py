@@ -25,6 +25,9 @@ from ..withheld.cases import draw_case
 DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
 SURE = 0.9  # probability from which the second curve is taken at the share of its cases that were right
 PRIOR_WIDTH = 3.0  # of a coefficient about that of the uncalibrated curves
+#: which way gain and excess of the null count for a gap; and gain, excess and share left, and margin for the first set
+GAP_SENSES = (0, 1, 1)
+RIGHT_SENSES = (0, 1, -1, -1, 1)
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000
 
@@ -119,7 +122,8 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         distance = (key["detectability"] or {}).get("nominal", 0.0)
         e = verdict["evidence"]
         gain, excess = saturating(e["gain"]), saturating(e["null_excess"])
-        if not truth or distance >= DETECTABLE:
+        # what the library lacks and leaves within the noise is no gap that these statistics could tell
+        if not truth or (distance >= DETECTABLE and not key["case"]["left_out"]):
             gap_rows.append([1.0, gain, excess])
             gap_truth.append(bool(truth))
         if not e["candidates"] or not truth or distance < DETECTABLE:
@@ -128,18 +132,15 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         if key["case"]["left_out"] and _twins(best, truth):
             continue  # no recording of one direction tells them apart: nothing to learn from
         right = not key["case"]["left_out"] and _names(verdict, best, truth, key["detectability"]["members"])
-        held = e["held_out"] or [0.0, 0.0]
         unexplained = np.log10(max(e["unexplained"], 1e-5))
-        right_rows.append([1.0, gain, saturating(e["excess"]), unexplained, saturating(e["margin"]), *held])
+        right_rows.append([1.0, gain, saturating(e["excess"]), unexplained, saturating(e["margin"])])
         right_truth.append(right)
-    gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap))
-    both = _logistic(np.array(right_rows), np.array(right_truth), np.array([*start.right, *start.confirm]))
-    sure = 1.0 / (1.0 + np.exp(-np.array(right_rows) @ np.array(both))) > SURE
+    gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap), GAP_SENSES)
+    names = _logistic(np.array(right_rows), np.array(right_truth), np.array(start.right), RIGHT_SENSES)
+    sure = 1.0 / (1.0 + np.exp(-np.array(right_rows) @ np.array(names))) > SURE
     most = (np.sum(np.array(right_truth)[sure]) + 1.0) / (sure.sum() + 2.0)  # rule of succession
-    size = len(start.right)
     source = f"{len(gap_rows)} development cases for the first curve, {len(right_rows)} for the second"
-    curves = tuple(gap), tuple(both[:size]), tuple(both[size:])
-    return Calibration(*curves, start.addition, start.remainder, round(float(most), 4), source)
+    return Calibration(tuple(gap), tuple(names), start.addition, start.remainder, round(float(most), 4), source)
 
 
 def _twins(one: set[str], other: set[str]) -> bool:
@@ -154,11 +155,18 @@ def _names(verdict: Mapping[str, Any], best: set[str], truth: set[str], members:
     return any(seen <= s <= truth for s in (sets or [best]))
 
 
-def _logistic(rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, width: float = PRIOR_WIDTH) -> list[float]:
-    """Coefficients (feature,) by maximum a posteriori about ``centre``."""
+def _logistic(
+    rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, senses: Sequence[int], width: float = PRIOR_WIDTH
+) -> list[float]:
+    """Coefficients (feature,) by maximum a posteriori about ``centre``.
+
+    ``senses`` says which way a feature may count (+1, -1, or 0 for either): more evidence must not lower a probability
+    because a few cases happened to be so.
+    """
     sign = np.where(truth, 1.0, -1.0)
 
     def loss(w: np.ndarray) -> float:
         return float(np.logaddexp(0.0, -sign * (rows @ w)).sum() + 0.5 * np.square((w - centre) / width).sum())
 
-    return [round(float(x), 4) for x in minimize(loss, centre, method="BFGS").x]
+    bounds = [(0.0 if sense > 0 else None, 0.0 if sense < 0 else None) for sense in senses]
+    return [round(float(x), 4) for x in minimize(loss, centre, method="L-BFGS-B", bounds=bounds).x]

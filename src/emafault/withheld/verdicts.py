@@ -87,6 +87,11 @@ def first_answer(verdict: Mapping) -> Answer:
     return Answer("named", tuple(entry["effects"]), float(entry["probability"]))
 
 
+def _first_set(verdict: Mapping) -> tuple[str, ...]:
+    """The first set that the verdict lists, whether it stands alone or leads a group."""
+    return next((tuple(e["effects"]) for e in verdict["which"] if e["effects"] and UNKNOWN not in e["effects"]), ())
+
+
 def names_truth(named: tuple[str, ...], truth: tuple[str, ...]) -> bool:
     """Whether a named set's structural part is the truth's and the truth's calibration effects are all named."""
     structural = set(named) - CALIBRATION
@@ -151,6 +156,7 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
         "answer": answer.kind,
         "named": list(answer.effects),
         "right": right,
+        "first_right": answer.kind in ("named", "group") and names_truth(_first_set(verdict), truth),
         "wrong_name": answer.kind in ("named", "group") and not right,
         "rivals": rivals,
         "confidence": min(1.0, confidence),
