@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from emafault.gap.decide import UNCALIBRATED, Calibration, decide, held_out_features
-from emafault.gap.how_far import closed
+from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, held_out_features
+from emafault.gap.how_far import closed, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.which import families, search
@@ -110,6 +110,20 @@ def test_probabilities_sum_to_one():
     problem = Problem(twin, ["one", "two"])
     decision = decide(problem, search(problem, twin.hypotheses, 3.0), twin.hypotheses, Calibration.load(UNCALIBRATED))
     assert sum(p for _, p in decision.sets) + decision.empty + decision.unknown == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.5, 8.0])
+def test_standard_error_of_a_mean_square_about_a_gap(bias):
+    rng = np.random.default_rng(1)
+    squares = np.square(bias + rng.standard_normal((20_000, 60))).mean(1)
+    assert square_error(np.sqrt(1.0 + bias**2), 60) == pytest.approx(squares.std(), rel=0.03)
+
+
+def test_of_a_gap_hardly_seen_noise_alone_leaves_no_share():
+    weak = held_out_features(1.28, 1.1, 300)
+    assert weak is not None and weak[1] < np.log10(MOST)
+    kept = held_out_features(1.28, 1.28, 300)
+    assert kept is not None and kept[1] > np.log10(MOST)
 
 
 def test_closed_share_and_its_absence_below_the_noise():

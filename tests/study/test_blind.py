@@ -1,0 +1,66 @@
+"""Calibration of the probabilities on blind cases whose verdicts are made up here."""
+
+import json
+
+import numpy as np
+import pytest
+
+from emafault.gap.decide import UNCALIBRATED, Calibration, saturating
+from emafault.study.blind import calibrate
+
+START = Calibration.load(UNCALIBRATED)
+
+
+def add(folder, name, effects, evidence, left_out=(), named=None):
+    """One case and its verdict."""
+    case = {"effects": {e: {} for e in effects}, "left_out": list(left_out)}
+    detectability = {"nominal": 1e4, "members": dict.fromkeys(effects, 1e4)} if effects else None
+    key = {"case": case, "detectability": detectability}
+    gain, null_excess, excess, unexplained = evidence
+    candidates = [[list(named or effects), gain]] if gain > 0 else []
+    found = {"gain": gain, "null_excess": null_excess, "excess": excess, "unexplained": unexplained, "margin": gain}
+    verdict = {"evidence": found | {"candidates": candidates, "held_out": None}, "which": []}
+    (folder / "keys").mkdir(parents=True, exist_ok=True)
+    (folder / "diagnoses" / name).mkdir(parents=True)
+    (folder / "keys" / f"{name}.json").write_text(json.dumps(key))
+    (folder / "diagnoses" / name / "diagnosis.json").write_text(json.dumps(verdict))
+
+
+def fill(folder, wrong):
+    """Effect-free cases, and single effects with one and the same clear evidence, ``wrong`` of them misnamed."""
+    rng = np.random.default_rng(4)
+    for n in range(30):
+        add(folder, f"t0_{n}", [], (0.0, 2.0 + 3.0 * rng.random(), 0.0, 1.0))
+    for n in range(40):
+        misnamed = ["cogging"] if n < wrong else None
+        add(folder, f"t1_{n}", ["stribeck"], (200.0, 60.0, 3.0, 1e-3), named=misnamed)
+
+
+def probability(coefficients, features):
+    return 1.0 / (1.0 + np.exp(-np.dot(coefficients, [1.0, *features])))
+
+
+def test_the_curves_tell_the_cases_apart_and_no_set_gets_more_than_its_kind_had_right(tmp_path):
+    fill(tmp_path, wrong=2)
+    found = calibrate(tmp_path, START)
+    assert probability(found.gap, [0.0, saturating(3.0)]) < 0.2
+    assert probability(found.gap, [saturating(200.0), saturating(60.0)]) > 0.95
+    assert found.most == pytest.approx(39.0 / 42.0, abs=1e-3)
+
+
+def test_evidence_counts_one_way_only(tmp_path):
+    fill(tmp_path, wrong=0)
+    for n in range(15):  # more gain, and wrong: chance must not turn the sense of the gain
+        add(tmp_path, f"t4_{n}", ["stribeck"], (900.0, 60.0, 3.0, 1e-3), named=["backlash"])
+    found = calibrate(tmp_path, START)
+    gain, excess, unexplained, margin = found.right[1:]
+    assert gain >= 0.0 >= excess and margin >= 0.0 >= unexplained
+    assert min(found.gap[1:]) >= 0.0
+
+
+def test_what_the_library_lacks_says_nothing_of_whether_there_is_a_gap(tmp_path):
+    fill(tmp_path / "one", wrong=0)
+    fill(tmp_path / "two", wrong=0)
+    for n in range(30):
+        add(tmp_path / "two", f"t3_{n}", ["backlash"], (0.0, 3.0, 3.0, 1.0), left_out=["backlash"])
+    assert calibrate(tmp_path / "one", START).gap == calibrate(tmp_path / "two", START).gap
