@@ -12,11 +12,16 @@ from . import style
 BEFORE, AFTER, MEASURED, FLOOR = "#c8553d", "#2a9d8f", "#22262b", "#8a8a8a"
 #: from nothing to see, through visible, to strong; z below 3 stays nearly white
 _MAP = LinearSegmentedColormap.from_list("z", ["#f7f7f5", "#f3e3c3", "#e8a15b", "#c8553d", "#6d1f2f"])
-_WORDS = {"rotor_angle": "rotor angle", "rotor_speed": "rotor speed (rad/s)", "order": "order of the turn"}
+#: coordinates in words, where a twin has none of its own
+COORDINATES = {"rotor_angle": "rotor angle", "rotor_speed": "rotor speed (rad/s)", "order": "order of the turn"}
 
 
 def draw_map(
-    rows: Sequence[str], columns: Sequence[tuple[str, str]], before: np.ndarray, after: np.ndarray | None
+    rows: Sequence[str],
+    columns: Sequence[tuple[str, str]],
+    before: np.ndarray,
+    after: np.ndarray | None,
+    words: Mapping[str, str] = COORDINATES,
 ) -> plt.Figure:
     """Equation by region: strength of the misfit before and after.
 
@@ -24,6 +29,7 @@ def draw_map(
     ----------
     columns : (coordinate, region) of each column; columns of one coordinate stand together
     before, after : (row, column) excess misfit in standard deviations; NaN where there is no statistic
+    words : coordinates in words
     """
     panels = [("before: nominal, recalibrated", before)] + (
         [("after: with the named effects", after)] if after is not None else []
@@ -50,7 +56,7 @@ def draw_map(
     start = 0
     for m in range(1, len(columns) + 1):
         if m == len(columns) or columns[m][0] != columns[start][0]:
-            name = _WORDS.get(columns[start][0], columns[start][0])
+            name = words.get(columns[start][0], columns[start][0].replace("_", " "))
             axes[0, 0].text(
                 0.5 * (start + m - 1), -0.72, name, ha="center", va="bottom", fontsize=8.5,
                 rotation=0 if m - start > 1 else 35, color="#444",

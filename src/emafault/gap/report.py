@@ -97,6 +97,11 @@ def _z(problem: Problem, prediction: np.ndarray) -> np.ndarray:
     return (problem.observed - prediction) / problem.deviations()
 
 
+def _coordinates(diagnosis: Diagnosis) -> Mapping[str, str]:
+    """Coordinates in words, as the twin calls them."""
+    return figures.COORDINATES | dict(getattr(diagnosis.twin, "coordinates", {}))
+
+
 def _where(page: Page, diagnosis: Diagnosis, labels: Mapping[str, str]) -> None:
     problem, after = diagnosis.explore, _after(diagnosis)
     rows = list(dict.fromkeys(c.equation for c in problem.cells))
@@ -115,7 +120,8 @@ def _where(page: Page, diagnosis: Diagnosis, labels: Mapping[str, str]) -> None:
     page.paragraph(
         lead + " Pale fields agree within the noise; grey ones hold no statistic.",
     )
-    page.figure("where", figures.draw_map(rows, columns, maps[0], maps[1]), "Equation by region, explored recordings.")
+    drawn = figures.draw_map(rows, columns, maps[0], maps[1], _coordinates(diagnosis))
+    page.figure("where", drawn, "Equation by region, explored recordings.")
     names = [*problem.part]
     ladder = diagnosis.ladder
     held = list(ladder.problem.part) if ladder is not None else []
@@ -293,7 +299,7 @@ def _statistics(page: Page, diagnosis: Diagnosis) -> None:
         "statistics",
         figures.draw_statistics(
             worst.equation.replace("_", " "),
-            worst.along.replace("_", " "),
+            _coordinates(diagnosis).get(worst.along, worst.along.replace("_", " ")),
             centres,
             problem.observed[own] / deviations,
             diagnosis.found.null.prediction[own] / deviations,

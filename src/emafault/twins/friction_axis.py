@@ -101,6 +101,7 @@ def build(case: str, arrays: Arrays) -> MeasuredTwin:
             f"{cut} of {len(found)} cycles explore",
             "an error of gtau scales mass and friction alike: this record cannot show it",
         ),
+        coordinates={"rotor_speed": "speed (m/s)"},
     )  # fmt: skip
 
 

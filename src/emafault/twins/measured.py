@@ -55,6 +55,7 @@ class MeasuredTwin:
     hypotheses: Sequence[Hypothesis]
     model: Model
     notes: tuple[str, ...] = ()
+    coordinates: Mapping[str, str] = field(default_factory=dict)  # in words, where not those of a rotor
 
     def cells(self, part: Sequence[str]) -> list[Cell]:
         """One cell per statistic of these recordings."""
