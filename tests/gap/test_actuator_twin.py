@@ -13,7 +13,7 @@ from emafault.config import compose, reference_actuator
 from emafault.gap.inference import Problem
 from emafault.gap.which import search
 from emafault.recording import Recording
-from emafault.twins.actuator import ActuatorTwin
+from emafault.twins.actuator import ActuatorTwin, with_corners
 from emafault.twins.actuator_statistics import SIZE, SPECIFICATION, Nominal, compute
 
 ACTUATOR = reference_actuator()
@@ -170,3 +170,30 @@ def test_threads_change_no_prediction(shop):
         found.append([twin.predict(points * scale, twin.names) for scale in np.linspace(1.0, 1.01, 6)])
         assert all(np.array_equal(twin._brought[name].command, c) for name, c in commands.items())
     assert np.array_equal(*found)
+
+
+@pytest.mark.parametrize("interval", [2e-4, 6.47e-4, 1e-3])
+@pytest.mark.parametrize(
+    ("name", "settings", "corners"),
+    [
+        ("reversal", {"amplitude": 0.0213, "speed": 0.31}, True),
+        ("ramp", {"speed": 0.3}, False),
+        ("sine", {"amplitude": 0.02, "frequency": 5.0}, False),
+        ("parabolic", {"acceleration": 0.5}, False),
+        ("step", {"amplitude": 0.02, "time": 0.0333}, False),
+    ],
+)
+def test_corners_of_a_command_between_its_samples_are_put_in(name, settings, corners, interval):
+    tick, duration = ACTUATOR.control_period, 0.6
+    true = command_positions(name, settings, duration, tick)
+    at_ticks = tick * np.arange(len(true))
+    time = interval * np.arange(1, int(duration / interval) + 1)
+    recorded = np.interp(time, at_ticks, true)
+    knots, values = with_corners(time, recorded)
+    if not corners:
+        assert len(knots) == len(time)
+        return
+    inside = (at_ticks >= time[0]) & (at_ticks <= time[-1])
+    missed = np.abs(np.interp(at_ticks, time, recorded) - true)[inside].max()
+    left = np.abs(np.interp(at_ticks, knots, values) - true)[inside].max()
+    assert left < 1e-3 * max(missed, 1e-6)
