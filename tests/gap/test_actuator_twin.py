@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from emafault.actuator.commands import command_positions
+from emafault.actuator.commands import command_positions, with_corners
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise, measure
 from emafault.actuator.simulate import simulate, time_axis
@@ -13,7 +13,7 @@ from emafault.config import compose, reference_actuator
 from emafault.gap.inference import Problem
 from emafault.gap.which import search
 from emafault.recording import Recording
-from emafault.twins.actuator import ActuatorTwin, with_corners
+from emafault.twins.actuator import ActuatorTwin
 from emafault.twins.actuator_statistics import SIZE, SPECIFICATION, Nominal, compute
 
 ACTUATOR = reference_actuator()

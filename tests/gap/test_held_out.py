@@ -2,10 +2,9 @@
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from emafault.gap.decide import MOST, held_out_features
+from emafault.gap.decide import MOST, share_left
 from emafault.gap.held_out import claim
 
 
@@ -42,10 +41,10 @@ def test_a_set_that_holds_is_left_alone():
 
 
 def test_held_out_share():
-    assert held_out_features(1.0, 1.0, 800) is None
-    helped = held_out_features(5.0, 1.1, 800)
-    assert helped is not None and helped[1] < np.log10(MOST)
-    idle = held_out_features(5.0, 4.9, 800)
-    assert idle is not None and idle[1] > np.log10(MOST)
-    made_worse = held_out_features(1.0, 3.0, 800)
-    assert made_worse is not None and made_worse[1] > 0.0
+    assert share_left(1.0, 1.0, 800) is None
+    helped = share_left(5.0, 1.1, 800)
+    assert helped is not None and helped < MOST
+    idle = share_left(5.0, 4.9, 800)
+    assert idle is not None and idle > MOST
+    made_worse = share_left(1.0, 3.0, 800)
+    assert made_worse is not None and made_worse > 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, held_out_features
+from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, share_left
 from emafault.gap.how_far import closed, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
@@ -120,16 +120,16 @@ def test_standard_error_of_a_mean_square_about_a_gap(bias):
 
 
 def test_of_a_gap_hardly_seen_noise_alone_leaves_no_share():
-    weak = held_out_features(1.28, 1.1, 300)
-    assert weak is not None and weak[1] < np.log10(MOST)
-    kept = held_out_features(1.28, 1.28, 300)
-    assert kept is not None and kept[1] > np.log10(MOST)
+    weak = share_left(1.28, 1.1, 300)
+    assert weak is not None and weak < MOST
+    kept = share_left(1.28, 1.28, 300)
+    assert kept is not None and kept > MOST
 
 
 def test_closed_share_and_its_absence_below_the_noise():
     assert closed(3.0, 1.0, 1.0, 400) == pytest.approx(1.0)
     assert closed(3.0, 3.0, 1.0, 400) == pytest.approx(0.0)
     assert closed(1.01, 1.0, 1.0, 400) is None
-    assert held_out_features(1.0, 1.0, 400) is None
-    worse = held_out_features(2.0, 2.5, 400)
-    assert worse is not None and worse[1] > 0.0
+    assert share_left(1.0, 1.0, 400) is None
+    worse = share_left(2.0, 2.5, 400)
+    assert worse is not None and worse > 1.0

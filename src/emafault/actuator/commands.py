@@ -7,6 +7,9 @@ import numpy as np
 
 from ..errors import InputError
 
+CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner
+LEAST_TURN = 1e-7  # rad in an interval by which the command's slope changes at a corner
+
 
 def parabolic(t, *, acceleration):
     """Constant acceleration (rad/s2) from rest."""
@@ -100,3 +103,28 @@ def resample(time: np.ndarray, position: np.ndarray, duration: float, control_pe
         first = position[0] - (position[1] - position[0]) / (time[1] - time[0]) * time[0]
         time, position = np.concatenate([[0.0], time]), np.concatenate([[first], position])
     return np.interp(ticks, time, position)
+
+
+def with_corners(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A recorded command with the corners between its samples put in, where two straight lines meet.
+
+    Where a ramp turns round within a recording interval the chord between the samples misses the turn, and the actuator
+    on the chord lags behind the recorded one as if its control were slow. (sample,) time (s) and position (rad).
+    """
+    if len(time) < 6:
+        return time, position
+    slope = np.diff(position)
+    bend = np.diff(slope)  # bend[k] at sample k + 1
+    # between samples n and n + 1: both ends bend, their neighbours hardly
+    n = np.arange(2, len(position) - 3)
+    left, middle, right = slope[n - 1], slope[n], slope[n + 1]
+    turn = right - left
+    quiet = np.maximum(np.abs(bend[n - 2]), np.abs(bend[n + 1]))
+    share = np.divide(middle - right, left - right, out=np.zeros(len(n)), where=turn != 0.0)
+    found = (np.abs(turn) > CORNER * quiet) & (np.abs(turn) > LEAST_TURN) & (share > 0.01) & (share < 0.99)
+    at, share = n[found], share[found]
+    step = time[1] - time[0]
+    times = np.concatenate([time, time[at] + share * step])
+    positions = np.concatenate([position, position[at] + share * slope[at - 1]])
+    order = np.argsort(times, kind="stable")
+    return times[order], positions[order]

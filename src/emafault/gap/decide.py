@@ -1,8 +1,8 @@
 """From evidence to probabilities and a verdict, with coefficients calibrated on blind cases and then frozen.
 
 Two logistic curves turn what a search has found into probabilities: that there is a gap at all, and, if so, that the
-best set
-is its cause and not the least bad of a library that lacks the cause. Their coefficients live in a calibration file.
+best set is its cause and not the least bad of a library that lacks the cause. Their coefficients live in a calibration
+file.
 """
 
 import json
@@ -112,8 +112,8 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
     return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
 
 
-def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarray | None:
-    """(1, log share left) of the confirm recordings' excess misfit; None where they show no gap beyond noise.
+def share_left(recalibrated: float, after: float, size: int) -> float | None:
+    """Share of the confirm recordings' excess misfit that the named set leaves; None where they show no gap.
 
     A gap that is not there before and there after the named set counts as seen. What is left counts as far as it is
     more than two standard errors, for of a gap hardly seen noise alone leaves a large share.
@@ -122,8 +122,7 @@ def held_out_features(recalibrated: float, after: float, size: int) -> np.ndarra
     error, error_left = square_error(recalibrated, size), square_error(after, size)
     if visible < 4.0 * error and left < 4.0 * error_left:
         return None
-    share = max(left - 2.0 * error_left, 0.0) / max(visible, error)
-    return np.array([1.0, np.log10(np.clip(share, 1e-3, 10.0))])
+    return max(left - 2.0 * error_left, 0.0) / max(visible, error)
 
 
 def _sigmoid(x: float) -> float:
@@ -147,9 +146,9 @@ def decide(
     found: Search,
     hypotheses: Sequence,
     calibration: Calibration,
-    held_out: np.ndarray | None = None,
+    left: float | None = None,
 ) -> Decision:
-    """Turn a search into a verdict by the frozen curves; ``held_out`` are the features of the confirm recordings."""
+    """Turn a search into a verdict by the frozen curves; ``left`` is what ``share_left`` says of it."""
     evidence, group = evidence_of(problem, found)
     p_gap = _sigmoid(float(np.dot(calibration.gap, evidence.gap_features())))
     if not found.candidates:
@@ -157,7 +156,7 @@ def decide(
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
     odds = float(np.dot(calibration.right, evidence.right_features()))
     p_right = calibration.most * _sigmoid(odds)
-    if evidence.unexplained > MOST or (held_out is not None and held_out[1] > np.log10(MOST)):
+    if evidence.unexplained > MOST or (left is not None and left > MOST):
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .decide import Calibration, Decision, decide, held_out_features, is_named
+from .decide import Calibration, Decision, decide, is_named, share_left
 from .how_far import Ladder, Rung, climb, closed
 from .inference import Candidate, Point, Problem
 from .twin import INTERVAL, Twin
@@ -76,16 +76,16 @@ def diagnose(
     verdict["digest"] = hashlib.sha256(json.dumps(verdict, sort_keys=True).encode()).hexdigest()[:16]
     # from here on the confirm recordings are open
     ladder = climb(twin, confirm, problem, found.null, best) if confirm else None
-    sealed, held_out = verdict["verdict"], None
+    sealed, left = verdict["verdict"], None
     # the recalibrated model has what a calibration effect names already: only what is structural can help beyond it
     if ladder is not None and best is not None and any(by_id[e].kind != "calibration" for e in best.effects):
-        held_out = held_out_features(ladder.recalibrated.rms, ladder.after.rms, len(ladder.problem.cells))
-        decision = decide(problem, found, hypotheses, calibration, held_out)
+        left = share_left(ladder.recalibrated.rms, ladder.after.rms, len(ladder.problem.cells))
+        decision = decide(problem, found, hypotheses, calibration, left)
         verdict["verdict"] = decision.verdict
         verdict["which"] = _which(twin, problem, found, decision, by_id)
     verdict["before_confirm"] = sealed
     verdict["evidence"] = asdict(decision.evidence) | {
-        "held_out": None if held_out is None else [float(x) for x in held_out],
+        "held_out": left,
         "candidates": [[list(c.effects), round(c.gain, 2)] for c in found.candidates[:6]],
     }
     mixture = _mixture(problem, found, decision, best)

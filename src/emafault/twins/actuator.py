@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..actuator.commands import resample
+from ..actuator.commands import resample, with_corners
 from ..actuator.kernel import run_actuator
 from ..actuator.parameters import ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
@@ -44,8 +44,6 @@ COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it
 RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
 RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance and so the ripple's frequency
 START_SCATTER = 2e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
-CORNER = 20.0  # times the bends beside it, from which a bend of the command is a corner
-LEAST_TURN = 1e-7  # rad in an interval by which the command's slope changes at a corner
 SMOOTHED = 25  # samples over which the angle's noise is averaged before
 ASTRAY = 3.0  # times the angle by which recording and simulation go apart, over which they do
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
@@ -452,28 +450,3 @@ class ActuatorTwin:
     ) -> dict[str, tuple[float, float, float, str]]:
         """Catalogue parameters of an effect from those it was fitted in: name -> (value, low, high, units), 90 %."""
         return report({p.name: p for p in self.parameters}, effect, values, deviations)
-
-
-def with_corners(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A recorded command with the corners between its samples put in, where two straight lines meet.
-
-    Where a ramp turns round within a recording interval the chord between the samples misses the turn, and the actuator
-    on the chord lags behind the recorded one as if its control were slow. (sample,) time (s) and position (rad).
-    """
-    if len(time) < 6:
-        return time, position
-    slope = np.diff(position)
-    bend = np.diff(slope)  # bend[k] at sample k + 1
-    # between samples n and n + 1: both ends bend, their neighbours hardly
-    n = np.arange(2, len(position) - 3)
-    left, middle, right = slope[n - 1], slope[n], slope[n + 1]
-    turn = right - left
-    quiet = np.maximum(np.abs(bend[n - 2]), np.abs(bend[n + 1]))
-    share = np.divide(middle - right, left - right, out=np.zeros(len(n)), where=turn != 0.0)
-    found = (np.abs(turn) > CORNER * quiet) & (np.abs(turn) > LEAST_TURN) & (share > 0.01) & (share < 0.99)
-    at, share = n[found], share[found]
-    step = time[1] - time[0]
-    times = np.concatenate([time, time[at] + share * step])
-    positions = np.concatenate([position, position[at] + share * slope[at - 1]])
-    order = np.argsort(times, kind="stable")
-    return times[order], positions[order]
