@@ -14,6 +14,7 @@ from emafault.gap.inference import Problem
 from emafault.gap.which import search
 from emafault.recording import Recording
 from emafault.twins.actuator import ActuatorTwin
+from emafault.twins.actuator_noise import channel_spread
 from emafault.twins.actuator_statistics import SIZE, SPECIFICATION, Nominal, compute
 
 ACTUATOR = reference_actuator()
@@ -76,6 +77,30 @@ def test_noise_of_the_current_leaves_no_bias_in_the_inductance():
         noisy.append(compute(nominal, signals | {"phase_current_end": current}).values[m] - clean)
     # the noise's own square, which a plain regression on di/dt would hold, is many times the scatter
     assert abs(np.mean(noisy)) < 3.0 * np.std(noisy) / np.sqrt(len(noisy))
+
+
+def test_noise_is_that_of_the_bench_where_a_step_alone_would_not_tell_it(monkeypatch):
+    recordings = bench({}, fault=(0.0,) * 5)
+    runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=1.0)
+    positions = command_positions("step", {"amplitude": 0.02, "time": 0.03}, 0.5, ACTUATOR.control_period)
+    measured = measure(simulate(runs, positions, 0.5, 2e-4), runs, NOISE, 9)
+    soak = float(measured.pop("ambient_temperature")[0])
+    signals = {k: v[0] for k, v in measured.items()}
+    recordings["step"] = Recording(time_axis(0.5, 2e-4), ambient_temperature=soak, **signals)
+    twin = ActuatorTwin(ACTUATOR, recordings, NOISE)
+    hunting = twin._brought["step"].signals
+
+    def spread(signals, nominal):
+        # about a commutation a phase that should float carries current now and then
+        return channel_spread(signals, nominal) | ({"current": 0.3, "voltage": 1.0} if signals is hunting else {})
+
+    monkeypatch.setattr("emafault.twins.actuator.channel_spread", spread)
+    values = np.array([p.off if p.effect else p.mean for p in twin.parameters])
+    twin.settle(values, ["0", "1", "2"])
+    twin.settle(values, ["step"])
+    found = twin._brought["step"].noise
+    for channel in ("voltage", "current", "current_end"):
+        assert found[channel] == pytest.approx(getattr(NOISE, channel), rel=0.2), channel
 
 
 def test_another_inductance_leaves_no_trace_in_the_saturation():

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -67,8 +67,9 @@ class _Brought:
     jumps: np.ndarray  # samples at which the command has stepped
     computed: Computed
     usable: np.ndarray  # (statistic,) bool
-    noise: dict[str, float]
+    noise: dict[str, float]  # of the bench, by channel
     theta_0: float
+    variances: dict[str, float] = field(default_factory=dict)  # of this recording's channels, as last compared
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
@@ -263,7 +264,8 @@ class ActuatorTwin:
         """Take start angle, step instants, noise and its bias of the statistics from a comparison with one simulated
         point.
 
-        The sensors of a bench are the same in all its recordings, so the noise of a channel is the median over them.
+        The sensors of a bench are the same in all its recordings, so the noise of a channel is the median over those
+        that have been compared.
         """
         runs = {name: self._runs(values[None, :], name)[0] for name in part}
         with ThreadPoolExecutor(self.threads) as pool:
@@ -325,17 +327,22 @@ class ActuatorTwin:
         return resample(time, position, duration, self.actuator.control_period)
 
     def _noise(self, clean: Mapping[str, dict]) -> dict[str, float]:
-        """Noise of each channel (1 sigma): spread of the recordings less what the simulated machine itself does."""
-        found: dict[str, list[float]] = {c: [] for c in CHANNELS}
+        """Noise of each channel (1 sigma): spread of the recordings less what the simulated machine itself does.
+
+        Of all recordings compared so far, for a few that confirm would tell little by themselves.
+        """
         for name, signals in clean.items():
             b = self._brought[name]
             own, model = channel_spread(b.signals, b.nominal), channel_spread(signals, b.nominal)
-            for channel, spread in own.items():
-                found[channel].append(spread**2 - model.get(channel, 0.0) ** 2)
+            b.variances = {channel: spread**2 - model.get(channel, 0.0) ** 2 for channel, spread in own.items()}
+        known = [name for name, b in self._brought.items() if b.variances]
+        # where an actuator hunts, recording and simulation differ by more than noise
+        judged = [name for name in known if not self.erratic(name)] or known
         out = {}
         for channel in CHANNELS:
             usual = getattr(self.sensor_noise, channel)
-            value = float(np.median(found[channel])) if found[channel] else usual**2
+            found = [v[channel] for name in judged if channel in (v := self._brought[name].variances)]
+            value = float(np.median(found)) if found else usual**2
             out[channel] = float(np.sqrt(max(value, (0.05 * usual) ** 2)))
         return out
 
