@@ -7,7 +7,8 @@ from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, share_l
 from emafault.gap.how_far import closed, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
-from emafault.gap.which import families, search
+from emafault.gap.where import beyond_specification, equation_of
+from emafault.gap.which import SPECIFICATION, families, search
 
 
 class Lines:
@@ -102,7 +103,34 @@ def test_what_the_library_lacks_is_left_over_and_called_unknown():
     found = search(problem, twin.hypotheses, 3.0)
     decision = decide(problem, found, twin.hypotheses, Calibration.load())
     assert decision.verdict == "unknown"
-    assert families(problem, found.null.prediction)[0].excess > 5.0
+    assert families(problem, found.null)[0].excess > 5.0
+
+
+def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
+    twin = Lines(6, library=())
+    # the unit's slope is specified to 0.02; the recordings have it 0.2 away
+    twin.parameters[1] = Parameter("unit.slope", "1", 1.0, 1.0, 0.02, -5, 5, 0.01, specified="line")
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, (), 3.0)
+    worst = found.null_families[0]
+    assert (worst.equation, worst.label, worst.along) == ("line", "unit.slope", SPECIFICATION)
+    assert beyond_specification(found.null_families)[0]["parameter"] == "unit.slope"
+    assert equation_of(found.null_families) == "line"
+    assert all(f.along != SPECIFICATION for f in found.regions)
+    widened = families(problem, found.null, widened=[1])
+    assert all(f.label != "unit.slope" for f in widened)
+    decision = decide(problem, found, (), Calibration.load())
+    assert decision.verdict == "unknown"
+
+
+@pytest.mark.parametrize("other_form", [0.0, 0.9])
+def test_beside_a_remainder_one_more_effect_must_take_up_most_of_it(other_form):
+    twin = Lines(7, curvature=1.5, step=0.3, outside=other_form)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    named = set(found.candidates[0].effects)
+    assert named == ({"curve"} if other_form else {"curve", "step"})
+    assert found.candidates[0].polished
 
 
 def test_probabilities_sum_to_one():

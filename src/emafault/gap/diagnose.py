@@ -12,7 +12,7 @@ from .decide import Calibration, Decision, decide, is_named, share_left
 from .how_far import Ladder, Rung, climb, closed
 from .inference import Candidate, Point, Problem
 from .twin import INTERVAL, Twin
-from .where import equation_of, where
+from .where import beyond_specification, equation_of, where
 from .which import Search, confusability, search
 
 CONFUSED = 0.9  # cosine of two signatures from which the report calls them hard to tell apart
@@ -64,6 +64,7 @@ def diagnose(
     verdict: dict = {"bench": bench, "verdict": decision.verdict, "twin": twin.name}
     verdict["recordings"] = {"explore": list(explore), "confirm": list(confirm)}
     verdict["where"] = where(problem, found.null_families)
+    verdict["beyond_specification"] = beyond_specification(found.null_families)
     verdict["remains"] = where(problem, found.families) if best is not None else verdict["where"]
     verdict["which"] = _which(twin, problem, found, decision, by_id)
     verdict["groups"] = [sorted({e for c in decision.group for e in c.effects})] if len(decision.group) > 1 else []

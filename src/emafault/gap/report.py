@@ -287,7 +287,7 @@ def _faults(
 
 
 def _statistics(page: Page, diagnosis: Diagnosis) -> None:
-    families: Sequence[Family] = diagnosis.found.null_families
+    families: Sequence[Family] = diagnosis.found.regions
     if not families:
         return
     problem, worst, after = diagnosis.explore, families[0], _after(diagnosis)

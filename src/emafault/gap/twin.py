@@ -1,9 +1,8 @@
 """What the machine-independent diagnosis needs to know of a machine.
 
 A *twin* turns recordings into a vector of statistics and predicts that vector from parameters. The same code computes
-the
-statistics of measured and of simulated recordings. Everything else (where, which, how far, groups, unknown) is done by
-the core from these alone.
+the statistics of measured and of simulated recordings. Everything else (where, which, how far, groups, unknown) is done
+by the core from these alone.
 """
 
 from collections.abc import Sequence
@@ -33,11 +32,9 @@ class Parameter:
     """One parameter of the twin's model, with its prior.
 
     Nuisances (``effect`` None) have the Gaussian prior (``mean``, ``sd``) and are always free. The parameters of an
-    effect
-    are off at ``off`` and free, with the prior (``mean``, ``sd``) and the hard bounds (``low``, ``high``), only in
-    hypotheses
-    that contain the effect. A nuisance may also be the subject of a calibration hypothesis, which widens its prior to
-    the bounds. ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all.
+    effect are off at ``off`` and free, with the prior (``mean``, ``sd``) and the hard bounds (``low``, ``high``), only
+    in hypotheses that contain the effect. A nuisance may also be the subject of a calibration hypothesis, which widens
+    its prior to the bounds. ``recordings`` names the recordings that a per-recording nuisance belongs to, None for all.
     """
 
     name: str
@@ -53,6 +50,7 @@ class Parameter:
     fault: str | None = None  # component of the fault vector that this parameter is, if any
     amplitude: bool = False  # of an effect, which may be any power of ten smaller than its prior is wide
     least: float = 0.0  # distance from ``off`` below which an effect is none: smaller than it ever is
+    specified: str = ""  # equation that is in doubt where a nuisance is found far from what was specified or measured
 
 
 @dataclass(frozen=True)

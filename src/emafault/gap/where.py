@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .inference import Problem
-from .which import Family
+from .which import SPECIFICATION, Family
 
 VISIBLE = 3.0  # excess of a family, in standard deviations of its chi-square, from which it is listed
 LISTED = 12
@@ -14,11 +14,12 @@ LISTED = 12
 def where(problem: Problem, families: Sequence[Family]) -> list[dict]:
     """The families of statistics that the prediction misses, as the verdict file lists them, largest first.
 
-    ``z`` is the family's excess, (chi2 - n)/sqrt(2 n); ``share`` its part of the whole excess.
+    ``z`` is the family's excess, (chi2 - n)/sqrt(2 n); ``share`` its part of the whole excess, of which
+    ``beyond_specification`` may hold another.
     """
     total = sum(max(f.excess, 0.0) * np.sqrt(2.0 * f.size) for f in families) or 1.0
     out = []
-    for f in families[:LISTED]:
+    for f in [f for f in families if f.along != SPECIFICATION][:LISTED]:
         if f.excess < VISIBLE:
             break
         cells = [c for c in problem.cells if (c.equation, c.label, c.along) == (f.equation, f.label, f.along)]
@@ -27,6 +28,12 @@ def where(problem: Problem, families: Sequence[Family]) -> list[dict]:
         entry = {"equation": f.equation, "along": f.along, "from": float(low), "to": float(high)}
         out.append(entry | {"z": round(f.excess, 2), "share": round(share, 4), "statistic": f.label})
     return out
+
+
+def beyond_specification(families: Sequence[Family]) -> list[dict]:
+    """What a fit has moved far from its specification or measurement: parameter, equation, ``z`` as in ``where``."""
+    found = [f for f in families if f.along == SPECIFICATION and f.excess >= VISIBLE]
+    return [{"parameter": f.label, "equation": f.equation, "z": round(f.excess, 2)} for f in found]
 
 
 def equation_of(families: Sequence[Family]) -> str:

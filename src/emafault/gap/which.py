@@ -17,8 +17,11 @@ STRONG = 30.0  # gain above which covariance and derivatives are taken anew at t
 REBASES = 3
 CLOSE = 1000.0  # gain below which the empty set is fitted a second time: it may have stopped on its way
 DESERVED = 0.3  # share of what a set leaves that one more effect must take up
+MOST_OF_IT = 0.5  # the same where something is left even then
+FITS = 1.2  # objective per statistic up to which nothing is left
 WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
 COMPARED = 4  # candidates that are compared without it
+SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 
 
@@ -43,13 +46,19 @@ class Search:
     families: list[Family]  # of the best structural candidate (of the null where there is none)
     null_families: list[Family]
 
+    @property
+    def regions(self) -> list[Family]:
+        """What the null fit misses along a coordinate, largest first."""
+        return [f for f in self.null_families if f.along != SPECIFICATION]
 
-def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
+
+def families(problem: Problem, point: Point, widened: Sequence[int] = ()) -> list[Family]:
     """Misfit by kind of statistic, whitened one statistic at a time; largest first.
 
-    ``excess`` is (chi2 - n)/sqrt(2 n) of the family's n statistics.
+    ``excess`` is (chi2 - n)/sqrt(2 n) of the family's n statistics. How far a fit has moved what is specified or
+    measured of the unit (but for the ``widened`` parameters) is a misfit like any other.
     """
-    z = (problem.observed - prediction) / problem.deviations()
+    z = (problem.observed - point.prediction) / problem.deviations()
     groups: dict[tuple[str, str, str], list[float]] = {}
     # how exactly an actuator hunts about its target proves nothing where other recordings are there to judge by
     judging = [name for name in problem.part if not problem.erratic(name)] or list(problem.part)
@@ -57,6 +66,12 @@ def families(problem: Problem, prediction: np.ndarray) -> list[Family]:
         if cell.recording not in judging:
             continue
         groups.setdefault((cell.equation, cell.label, cell.along), []).append(float(value))
+    for m in problem.nuisances:
+        p = problem.parameters[m]
+        if p.specified and m not in widened:
+            label = p.name if p.recordings is None else p.name.rsplit(".", 1)[-1]
+            pull = float((point.values[m] - p.mean) / p.sd)
+            groups.setdefault((p.specified, label, SPECIFICATION), []).append(pull)
     out = [
         Family(e, label, along, float((np.square(v).sum() - len(v)) / np.sqrt(2.0 * len(v))), len(v))
         for (e, label, along), v in groups.items()
@@ -152,10 +167,14 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     if candidates and candidates[0].gain > HOPELESS:
         candidates[0] = problem.polish(null, candidates[0], by_id)
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
-        candidates = _deserved(problem, candidates)
-    prediction = candidates[0].point.prediction if candidates else null.prediction
-    after = families(problem, prediction)
-    return Search(null, candidates, singles, after, families(problem, null.prediction))
+        candidates = _deserved(problem, null, candidates, by_id)
+    unfitted = families(problem, null)
+    left = unfitted
+    if candidates:
+        chosen = [by_id[e] for e in candidates[0].effects]
+        widened = [m for h in chosen if h.kind == "calibration" for m in problem.effect_parameters(h)]
+        left = families(problem, candidates[0].point, widened)
+    return Search(null, candidates, singles, left, unfitted)
 
 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
@@ -163,21 +182,36 @@ def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]
     return sorted(candidates, key=lambda c: addition * (len(c.effects) - 1) - c.gain)
 
 
-def _deserved(problem: Problem, ranked: list[Candidate]) -> list[Candidate]:
+def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
     """Give way to a smaller set where what the larger one adds is little of what the smaller one leaves.
 
-    A cause written in another form leaves a remainder, and some other effect always takes a little of it up.
+    A cause written in another form leaves a remainder, and some other effect always takes a little of it up: where even
+    the larger set does not fit, the one more effect must take up most of it.
     """
-    if not ranked[0].polished:
-        return ranked
-    for part in ranked[1:]:
-        if not set(part.effects) < set(ranked[0].effects):
-            continue
+    size = len(problem.cells)
+
+    def idle(part: Candidate, whole: Candidate) -> bool:
         # with the priors' part, in which a calibration effect's gap stands
-        left = part.point.objective - len(problem.cells)
-        if part.point.objective - ranked[0].point.objective < DESERVED * left:
-            return [part, *(c for c in ranked if c is not part)]
+        left = part.point.objective - size
+        share = DESERVED if whole.point.objective < FITS * size else MOST_OF_IT
+        return part.point.objective - whole.point.objective < share * left
+
+    while ranked[0].polished:
+        members = set(ranked[0].effects)
+        part = next((c for c in ranked[1:] if set(c.effects) < members and idle(c, ranked[0])), None)
+        if part is None:
+            break
+        ranked = [_finished(problem, null, part, by_id), *(c for c in ranked if c is not part)]
     return ranked
+
+
+def _finished(problem: Problem, null: Point, candidate: Candidate, by_id: dict[str, Hypothesis]) -> Candidate:
+    """The candidate fitted to the end, its prediction averaged where single ones scatter."""
+    done = problem.polish(null, candidate, by_id)
+    if not problem.scatters:
+        return done
+    point = problem.averaged(done.point, [by_id[e] for e in done.effects])
+    return replace(done, point=point, gain=point.log_evidence - null.log_evidence)
 
 
 def _without_luck(

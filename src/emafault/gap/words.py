@@ -66,6 +66,10 @@ def finding(verdict: Mapping[str, Any]) -> str:
                     f"part contradict it: their misfit goes from {number(signal['recalibrated'])} to "
                     f"{number(signal['after'])} times the noise."
                 )
+        moved = (verdict.get("beyond_specification") or [{"z": 0.0}])[0]
+        if moved["z"] > (where[0]["z"] if where else 0.0):
+            name = moved["parameter"].replace(".", " ").replace("_", " ")
+            return text + f" To come near, the fit moves {name} far from its specification."
         return text + (f" The difference is largest in {_place(where[0])}." if where else "")
     claimed, held_out = _held_out(verdict)
     names = effect_words(first["effects"])

@@ -1,6 +1,7 @@
 """Parameters and hypotheses of the reference actuator: priors, where fits start, what a verdict says of a fit."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +54,8 @@ def parameters_of(
         centre = getattr(actuator, p.follows) if p.follows else p.nominal
         sd = p.tolerance * centre
         low, high = min(p.low, centre - 6 * sd), max(p.high, centre + 6 * sd)
-        out.append(Parameter(f"{id_}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd))
+        equation = EFFECTS[id_].equations[0]
+        out.append(Parameter(f"{id_}.{name}", p.units, centre, centre, sd, low, high, 2.0 * sd, specified=equation))
     groups: dict[str, list[str]] = {}
     for name, recording in recordings.items():
         key = "unknown" if recording.health == "unknown" else f"{recording.health} {name}"
@@ -71,7 +73,8 @@ def parameters_of(
             )
     for name, recording in recordings.items():
         dT = recording.ambient_temperature - actuator.reference_temperature
-        out.append(Parameter(f"{name}.dT", "K", dT, dT, SOAK_DEVIATION, dT - 5, dT + 5, 3.0, None, (name,), "dT"))
+        soak = Parameter(f"{name}.dT", "K", dT, dT, SOAK_DEVIATION, dT - 5, dT + 5, 3.0, None, (name,), "dT")
+        out.append(replace(soak, specified="electrical"))
     for effect in effects.values():
         if effect.kind == "calibration":
             continue

@@ -45,7 +45,7 @@ class Region:
 def worst_region(diagnosis: Diagnosis) -> Region | None:
     """The region that the null fit misses most, in the recording where it is missed most; None where nothing is."""
     twin, problem = diagnosis.twin, diagnosis.explore
-    families = diagnosis.found.null_families
+    families = diagnosis.found.regions
     if not isinstance(twin, ActuatorTwin) or not families:
         return None
     worst = families[0]
