@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.errors import InputError
+from emafault.actuator.commands import jumps_of
 from emafault.gap.bench import check_bench, read_bench, split_bench
 from emafault.recording import write_recording
 
@@ -169,3 +170,13 @@ def test_repetitions_of_a_condition_stay_on_one_side(shop):
     repeated = {f"{n}{k}": r for n, r in bench.items() for k in "xy"}
     explore, confirm = split_bench(repeated)
     assert confirm and {n[:-1] for n in explore}.isdisjoint({n[:-1] for n in confirm})
+
+
+def test_steps_alone_neither_explore_nor_confirm(shop):
+    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    plans = [(*kind, 20.0 * n, "unknown") for n, kind in enumerate((moving, moving, step, step))]
+    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+    steps = {n for n, r in bench.items() if len(jumps_of(r.commanded_position))}
+    assert len(steps) == 2
+    for side in split_bench(bench):
+        assert not set(side) <= steps

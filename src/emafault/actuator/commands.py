@@ -8,6 +8,8 @@ import numpy as np
 from ..errors import InputError
 
 CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner
+JUMP = 20.0  # times the rises beside it, from which a rise of a recorded command is a jump
+LEAST_JUMP = 5e-4  # rad
 LEAST_TURN = 1e-7  # rad in an interval by which the command's slope changes at a corner
 
 
@@ -103,6 +105,13 @@ def resample(time: np.ndarray, position: np.ndarray, duration: float, control_pe
         first = position[0] - (position[1] - position[0]) / (time[1] - time[0]) * time[0]
         time, position = np.concatenate([[0.0], time]), np.concatenate([[first], position])
     return np.interp(ticks, time, position)
+
+
+def jumps_of(position: np.ndarray) -> np.ndarray:
+    """Samples before which a recorded command (sample,), rad, has stepped."""
+    rises = np.abs(np.diff(position))
+    usual = np.maximum(np.roll(rises, 1), np.roll(rises, -1))
+    return np.flatnonzero((rises > JUMP * usual) & (rises > LEAST_JUMP)) + 1
 
 
 def with_corners(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

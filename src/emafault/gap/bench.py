@@ -5,13 +5,14 @@ recording that is whole but useless (it stands still, a channel clips, it is sam
 warning, and the bench is refused only if none is left.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
 
+from ..actuator.commands import jumps_of
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
@@ -340,13 +341,14 @@ def split_bench(recordings: Mapping[str, Recording]) -> tuple[list[str], list[st
 
     Whole conditions (health, command and temperature) go to one side. Explore keeps a healthy recording where there is
     one and one of the unknown fault where confirm has it; about three in ten confirm, such that both sides
-    spread over temperatures, commands and directions.
+    spread over temperatures, commands and directions and neither is of steps alone.
     """
     names = sorted(recordings)
     number = round(len(names) / 3.5) if len(names) > 2 else len(names) - 1
     conditions = _conditions({n: recordings[n] for n in names})
     if len(conditions) == 1 and len(names) > 1:
         conditions = [[n] for n in names]  # repetitions of one condition: by recording is all there is
+    steps = {n for n in names if len(jumps_of(recordings[n].commanded_position))}
     best: tuple[float, tuple[str, ...]] | None = None
     for size in range(1, len(conditions)):
         if size > number:
@@ -361,7 +363,7 @@ def split_bench(recordings: Mapping[str, Recording]) -> tuple[list[str], list[st
             explore = [n for n in names if n not in confirm]
             if not _allowed(recordings, explore, confirm):
                 continue
-            cost = _cost(recordings, explore, confirm) + 2.0 * (number - len(confirm))
+            cost = _cost(recordings, explore, confirm, steps) + 2.0 * (number - len(confirm))
             if best is None or (cost, confirm) < best:
                 best = (cost, confirm)
     held = list(best[1]) if best else []
@@ -397,7 +399,9 @@ def _allowed(recordings: Mapping[str, Recording], explore: Sequence[str], confir
     return all(recordings[n].health in ("seeded", *inside) for n in confirm)
 
 
-def _cost(recordings: Mapping[str, Recording], explore: Sequence[str], confirm: Sequence[str]) -> float:
+def _cost(
+    recordings: Mapping[str, Recording], explore: Sequence[str], confirm: Sequence[str], steps: Set[str]
+) -> float:
     """What a split lacks: range of temperature, commands and directions in explore, spread and kinds in confirm."""
 
     def ambient(names: Sequence[str]) -> np.ndarray:
@@ -418,6 +422,8 @@ def _cost(recordings: Mapping[str, Recording], explore: Sequence[str], confirm: 
     cost += 0.5 * (1.0 - len(set(kinds(confirm))) / len(confirm))
     healths = {r.health for r in recordings.values()}
     cost += 0.5 * sum(h not in {recordings[n].health for n in confirm} for h in healths) / len(healths)
+    # after a step an actuator hunts, and how it does proves little: neither side is made of such recordings alone
+    cost += sum(set(side) <= steps for side in (explore, confirm)) * (len(steps) < len(recordings))
     total = sum(r.time[-1] for r in recordings.values())
     share = sum(recordings[n].time[-1] for n in confirm) / total
     return cost + 2.0 * max(0.0, share - 0.4)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..actuator.commands import resample, with_corners
+from ..actuator.commands import jumps_of, resample, with_corners
 from ..actuator.kernel import run_actuator
 from ..actuator.parameters import ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
@@ -123,9 +123,7 @@ class ActuatorTwin:
         still = max(1, int(rest[0]) if len(rest) else len(signals["rotor_angle"]))
         theta_0 = float(np.mean(signals["rotor_angle"][: max(1, still - 1)]))
         nominal = Nominal.of(self.actuator, recording, theta_0)
-        rises = np.abs(np.diff(recording.commanded_position))
-        usual = np.maximum(np.roll(rises, 1), np.roll(rises, -1))
-        jumps = np.flatnonzero((rises > 20.0 * usual) & (rises > 5e-4)) + 1
+        jumps = jumps_of(recording.commanded_position)
         command = self._command(recording, jumps)
         computed = compute(nominal, signals, keep=True)
         usable = computed.count >= MINIMUM_COUNT
