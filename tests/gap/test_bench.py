@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.errors import InputError
 from emafault.actuator.commands import jumps_of
+from emafault.errors import InputError
 from emafault.gap.bench import check_bench, read_bench, split_bench
 from emafault.recording import write_recording
 
