@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.actuator.commands import command_positions
+from emafault.actuator.commands import command_positions, jumps_of
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
 from emafault.config import reference_actuator
@@ -170,3 +170,27 @@ def test_a_saturating_inductance_at_the_current_limit_comes_to_an_end(s):
         assert np.all(np.isfinite(values)), name
     # the regulator sets the current whatever the inductance, so the motion is nearly the same
     assert signals["output_position"] == pytest.approx(plain["output_position"], abs=0.02 * 0.05)
+
+
+@pytest.mark.parametrize("interval", [5e-5, 5.7e-5, 7e-5, 1e-4, 1.44e-4, 2e-4, 2.5e-4, 4.1e-4, 1e-3])
+@pytest.mark.parametrize("moment", [0.0226639, 0.03, 0.07771])
+def test_a_recorded_step_is_found_however_it_is_sampled(interval, moment):
+    tick, duration = 1e-4, 0.3
+    time = interval * np.arange(1, int(duration / interval) + 1)
+
+    def recorded(name, **settings):
+        true = command_positions(name, settings, duration, tick)
+        return np.interp(time, tick * np.arange(len(true)), true)
+
+    step = recorded("step", amplitude=-0.02, time=moment)
+    ((last, first),) = jumps_of(step)
+    assert step[last] == 0.0 and step[first] == -0.02
+    assert time[last] - tick <= moment <= time[first] + tick
+    for name, settings in (
+        ("reversal", {"amplitude": 0.02, "speed": 0.31}),
+        ("ramp", {"speed": -0.5}),
+        ("sine", {"amplitude": 0.01, "frequency": 6.0}),
+        ("chirp", {"amplitude": 0.01, "frequency_start": 1.0, "frequency_end": 12.0}),
+        ("parabolic", {"acceleration": 0.7}),
+    ):
+        assert len(jumps_of(recorded(name, **settings))) == 0

@@ -10,6 +10,7 @@ from ..errors import InputError
 CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner
 JUMP = 20.0  # times the rises beside it, from which a rise of a recorded command is a jump
 LEAST_JUMP = 5e-4  # rad
+WIDEST_JUMP = 3  # intervals; a control tick has at most two samples within it
 LEAST_TURN = 1e-7  # rad in an interval by which the command's slope changes at a corner
 
 
@@ -108,10 +109,20 @@ def resample(time: np.ndarray, position: np.ndarray, duration: float, control_pe
 
 
 def jumps_of(position: np.ndarray) -> np.ndarray:
-    """Samples before which a recorded command (sample,), rad, has stepped."""
-    rises = np.abs(np.diff(position))
-    usual = np.maximum(np.roll(rises, 1), np.roll(rises, -1))
-    return np.flatnonzero((rises > JUMP * usual) & (rises > LEAST_JUMP)) + 1
+    """(jump, 2) last sample before and first after each step of a recorded command (sample,), rad.
+
+    A step that takes a control tick may be recorded on its way, over several samples where these are closer.
+    """
+    rises = np.diff(position, prepend=position[:1], append=position[-1:])  # rises[n] leads to sample n
+    found: list[tuple[int, int]] = []
+    for width in range(1, WIDEST_JUMP + 1):
+        before = np.arange(len(position) - width)
+        total = np.abs(position[before + width] - position[before])
+        quiet = np.maximum(np.abs(rises[before]), np.abs(rises[before + width + 1]))
+        jumps = np.flatnonzero((total > JUMP * quiet) & (total > LEAST_JUMP))
+        known = {n for start, end in found for n in range(start, end + 1)}
+        found += [(int(n), int(n) + width) for n in jumps if known.isdisjoint(range(n, n + width + 1))]
+    return np.array(sorted(found), dtype=int).reshape(-1, 2)
 
 
 def with_corners(time: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -64,7 +64,7 @@ class _Brought:
     signals: dict
     nominal: Nominal
     command: np.ndarray
-    jumps: np.ndarray  # samples at which the command has stepped
+    jumps: np.ndarray  # (jump, 2) last sample before and first after each step of the command
     computed: Computed
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]  # of the bench, by channel
@@ -294,7 +294,7 @@ class ActuatorTwin:
     def _place_steps(self, name: str, run: np.void) -> None:
         """A step of the command lies somewhere in its recording interval: take the instant that fits the angle best."""
         b = self._brought[name]
-        until = min(len(b.recording.time), int(b.jumps[0]) + max(10, round(0.015 / b.nominal.interval)))
+        until = min(len(b.recording.time), int(b.jumps[0, 1]) + max(10, round(0.015 / b.nominal.interval)))
         best = np.inf
         for part in (None, 0.0, 0.25, 0.5, 0.75, 0.9, 1.0):
             command = self._command(b.recording, b.jumps, part)
@@ -306,7 +306,8 @@ class ActuatorTwin:
     def _command(self, recording: Recording, jumps: np.ndarray, part: float | None = None) -> np.ndarray:
         """Command at the control ticks: linear between recorded values, but for jumps that happen at once.
 
-        ``part`` is the fraction of the interval after which a jump happens; None leaves it linear.
+        ``part`` is the fraction of the time between the samples beside a jump after which it happens; None leaves it
+        linear.
         """
         interval = recording.interval
         duration = interval * len(recording.time)
@@ -314,10 +315,12 @@ class ActuatorTwin:
         position = recording.commanded_position
         time, position = with_corners(time, position)
         if part is not None and len(jumps):
-            recorded = recording.commanded_position
-            moments = interval * (jumps + 1) - interval * (1.0 - part)
-            time = np.concatenate([time, moments - 1e-6, moments - 1e-9])
-            position = np.concatenate([position, recorded[jumps - 1], recorded[jumps]])
+            recorded, (last, first) = recording.commanded_position, jumps.T
+            begin, end = interval * (last + 1), interval * (first + 1)
+            moments = begin + part * (end - begin)
+            within = np.any((time[:, None] > begin + 1e-9) & (time[:, None] < end - 1e-9), axis=1)
+            time = np.concatenate([time[~within], moments - 1e-6, moments - 1e-9])
+            position = np.concatenate([position[~within], recorded[last], recorded[first]])
             order = np.argsort(time, kind="stable")
             time, position = time[order], position[order]
             keep = np.concatenate([[True], np.diff(time) > 0])

@@ -163,9 +163,11 @@ def _block(name: str, i: np.ndarray, order: float, unbalance: complex, spread: f
 def _parameters(unbalance: complex, zero: complex, spread: float) -> tuple[Parameter, ...]:
     sd = max(spread, REPEATABILITY)
     found = [
-        nuisance("u_re", "1", unbalance.real, sd), nuisance("u_im", "1", unbalance.imag, sd),
-        nuisance("z_re", "1", zero.real, 3 * sd), nuisance("z_im", "1", zero.imag, 3 * sd),
-    ]  # fmt: skip
+        nuisance("u_re", "1", unbalance.real, sd, specified="electrical"),
+        nuisance("u_im", "1", unbalance.imag, sd, specified="electrical"),
+        nuisance("z_re", "1", zero.real, 3 * sd, specified="sensor_current"),
+        nuisance("z_im", "1", zero.imag, 3 * sd, specified="sensor_current"),
+    ]
     for c in "abc":
         found += [
             freedom(f"shorted_turns_{c}", f"d_{c}", "1", 0.3, 0.0, 3.0),
