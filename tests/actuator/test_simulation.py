@@ -184,7 +184,7 @@ def test_a_recorded_step_is_found_however_it_is_sampled(interval, moment):
 
     step = recorded("step", amplitude=-0.02, time=moment)
     ((last, first),) = jumps_of(step)
-    assert step[last] == 0.0 and step[first] == -0.02
+    assert step[last] == pytest.approx(0.0, abs=1e-9) and step[first] == pytest.approx(-0.02, abs=1e-9)
     assert time[last] - tick <= moment <= time[first] + tick
     for name, settings in (
         ("reversal", {"amplitude": 0.02, "speed": 0.31}),
