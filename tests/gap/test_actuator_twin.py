@@ -103,6 +103,17 @@ def test_noise_is_that_of_the_bench_where_a_step_alone_would_not_tell_it(monkeyp
         assert found[channel] == pytest.approx(getattr(NOISE, channel), rel=0.2), channel
 
 
+def test_harmonics_of_the_ripple_are_not_used_without_the_current_at_an_instant():
+    recordings = bench({})
+    blind = {n: replace(r, phase_current_end=None) for n, r in recordings.items()}
+
+    def labels(brought):
+        return {c.label for c in ActuatorTwin(ACTUATOR, brought, NOISE).cells(list(brought))}
+
+    lost = labels(recordings) - labels(blind)
+    assert {"5th harmonic", "7th harmonic"} <= lost and "sector 0" not in lost
+
+
 def test_another_inductance_leaves_no_trace_in_the_saturation():
     silent = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
     changes = {}

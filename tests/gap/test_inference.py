@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, share_left
-from emafault.gap.how_far import closed, square_error
+from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
@@ -131,6 +131,42 @@ def test_beside_a_remainder_one_more_effect_must_take_up_most_of_it(other_form):
     named = set(found.candidates[0].effects)
     assert named == ({"curve"} if other_form else {"curve", "step"})
     assert found.candidates[0].polished
+
+
+class HalfTold(Lines):
+    """The explored recording looks at one side only, where the slope is hardly told from the offset."""
+
+    def __init__(self, seed, **effects):
+        super().__init__(seed, **effects)
+        self.told = {"one": self.x > 0.9, "two": np.ones(len(self.x), bool)}
+
+    def _rows(self, part):
+        return np.concatenate([self.told[n] for n in part])
+
+    def cells(self, part):
+        return [c for c, told in zip(super().cells(part), self._rows(part), strict=True) if told]
+
+    def observed(self, part):
+        return super().observed(part)[self._rows(part)]
+
+    def predict(self, values, part):
+        return super().predict(values, part)[:, self._rows(part)]
+
+    def covariance(self, values, part):
+        return self.sigma**2 * np.eye(int(self._rows(part).sum()))
+
+
+@pytest.mark.parametrize(("curvature", "held"), [(0.0, True), (3.0, False)])
+def test_what_the_explored_recordings_leave_open_contradicts_nothing(curvature, held):
+    twin = HalfTold(8, curvature=curvature)
+    explore = Problem(twin, ["one"])
+    null = explore.fit_null()
+    confirm = Problem(twin, ["two"])
+    confirm.set_covariance(null.values)
+    frozen = refit(confirm, null.values, [])
+    assert frozen.rms > 2.0
+    ladder = Ladder(confirm, frozen, frozen, frozen.rms, frozen, left_open(explore, confirm, null))
+    assert (ladder.misfit(frozen) < 1.3) == held
 
 
 def test_probabilities_sum_to_one():

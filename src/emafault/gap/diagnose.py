@@ -80,7 +80,8 @@ def diagnose(
     sealed, left = verdict["verdict"], None
     # the recalibrated model has what a calibration effect names already: only what is structural can help beyond it
     if ladder is not None and best is not None and any(by_id[e].kind != "calibration" for e in best.effects):
-        left = share_left(ladder.recalibrated.rms, ladder.after.rms, len(ladder.problem.cells))
+        recalibrated, named_set = ladder.misfit(ladder.recalibrated), ladder.misfit(ladder.after)
+        left = share_left(recalibrated, named_set, len(ladder.problem.cells))
         decision = decide(problem, found, hypotheses, calibration, left)
         verdict["verdict"] = decision.verdict
         verdict["which"] = _which(twin, problem, found, decision, by_id)

@@ -119,6 +119,13 @@ class Ladder:
     recalibrated: Rung
     placebo: float
     after: Rung
+    open: np.ndarray  # (statistic, direction) whitened; see ``left_open``
+
+    def misfit(self, rung: Rung) -> float:
+        """Root mean square of a rung's residual beyond what the explored recordings leave open of the unit."""
+        r, inner = rung.residual, np.eye(self.open.shape[1]) + self.open.T @ self.open
+        along = self.open.T @ r
+        return float(np.sqrt(max(r @ r - along @ np.linalg.solve(inner, along), 0.0) / len(r)))
 
     def signal(self) -> dict:
         """The verdict file's entry; the floor is the noise itself, in whose units the others are.
@@ -134,6 +141,24 @@ class Ladder:
         return entry | {"floor": 1.0, "closed": share}
 
 
+def left_open(explore: Problem, confirm: Problem, point: Point) -> np.ndarray:
+    """(statistic, direction) whitened changes of the confirm recordings by one deviation of the unit's parameters, as
+    far as a fit of the explored recordings leaves them open, faults and effects given.
+
+    Where nothing explored has told the inertia, a reversal that confirms contradicts no effect by telling it.
+    """
+    unit = [m for m in point.free if m in confirm.nuisances and explore.parameters[m].recordings is None]
+    if not unit:
+        return np.zeros((len(confirm.cells), 0))
+    scale = np.sqrt(np.diag(point.covariance))
+    own = [point.free.index(m) for m in unit]
+    precision = np.linalg.inv(point.covariance / np.outer(scale, scale))[np.ix_(own, own)]
+    deviations = np.linalg.cholesky(np.linalg.inv(0.5 * (precision + precision.T)))
+    prediction = confirm.predict(point.values)[0]
+    jacobian = confirm.nuisance_jacobian(point.values, prediction, unit, exact=False)
+    return confirm.whiten(jacobian * scale[own]) @ deviations
+
+
 def climb(twin: Twin, confirm: Sequence[str], explore: Problem, null: Point, best: Candidate | None) -> Ladder:
     """Open the confirm recordings and put every model on them."""
     problem = Problem(twin, confirm)
@@ -147,7 +172,8 @@ def climb(twin: Twin, confirm: Sequence[str], explore: Problem, null: Point, bes
     nominal = refit(problem, without_tolerance(explore, null), free)
     recalibrated = refit(problem, null.values, free)
     if best is None:
-        return Ladder(problem, nominal, recalibrated, recalibrated.rms, recalibrated)
+        return Ladder(problem, nominal, recalibrated, recalibrated.rms, recalibrated, np.zeros((len(problem.cells), 0)))
     count = len(best.point.free) - len(explore.nuisances)
     blind = placebo(explore, problem, null, recalibrated, free, count)
-    return Ladder(problem, nominal, recalibrated, blind, refit(problem, best.point.values, free))
+    after = refit(problem, best.point.values, free)
+    return Ladder(problem, nominal, recalibrated, blind, after, left_open(explore, problem, best.point))

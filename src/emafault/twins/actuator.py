@@ -24,6 +24,7 @@ from .actuator_statistics import (
     _SUM_I,
     LATTICE,
     SIZE,
+    SPECIFICATION,
     Computed,
     Nominal,
     cells_of,
@@ -47,6 +48,8 @@ START_SCATTER = 2e-4, 2e-3  # rad, least and most over which commutations fall d
 SMOOTHED = 25  # samples over which the angle's noise is averaged before
 ASTRAY = 3.0  # times the angle by which recording and simulation go apart, over which they do
 BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regressors
+#: statistics that the ripple outweighs, with rare large values, where only mean currents are recorded
+RIPPLED = [m for m, s in enumerate(SPECIFICATION) if s[0] in ("5th harmonic", "7th harmonic")]
 #: statistics of the three phases, (phase, statistic)
 ALIKE = (
     np.arange(3 * _PER_PHASE).reshape(3, -1),
@@ -127,6 +130,8 @@ class ActuatorTwin:
         command = self._command(recording, jumps)
         computed = compute(nominal, signals, keep=True)
         usable = computed.count >= MINIMUM_COUNT
+        if not nominal.has_end:
+            usable[RIPPLED] = False
         brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
         if not nominal.has_end:
             brought.repeats = RIPPLE_REPEATS
