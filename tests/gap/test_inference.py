@@ -114,7 +114,9 @@ def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
     found = search(problem, (), 3.0)
     worst = found.null_families[0]
     assert (worst.equation, worst.label, worst.along) == ("line", "unit.slope", SPECIFICATION)
-    assert beyond_specification(found.null_families)[0]["parameter"] == "unit.slope"
+    moved = beyond_specification(found.null_families)[0]
+    pull = abs(found.null.values[1] - 1.0) / 0.02
+    assert moved["parameter"] == "unit.slope" and moved["deviations"] == pytest.approx(pull, abs=0.06)
     assert equation_of(found.null_families) == "line"
     assert all(f.along != SPECIFICATION for f in found.regions)
     widened = families(problem, found.null, widened=[1])

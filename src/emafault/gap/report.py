@@ -14,7 +14,7 @@ from .diagnose import Diagnosis
 from .inference import Problem
 from .retrained import MARKS
 from .which import Family
-from .words import cannot_tell, consequence, effect_words, finding, interval, number
+from .words import cannot_tell, consequence, effect_words, finding, interval, moved_words, number
 
 NAMED = ("explained", "group", "partly")
 MANY = 12  # regions of one coordinate in the map
@@ -117,6 +117,9 @@ def _where(page: Page, diagnosis: Diagnosis, labels: Mapping[str, str]) -> None:
         if worst
         else "Nothing stands out of the noise."
     )
+    moved = diagnosis.verdict["beyond_specification"]
+    if moved:
+        lead += f" Without an effect the fit moves {', '.join(map(moved_words, moved))}."
     page.paragraph(
         lead + " Pale fields agree within the noise; grey ones hold no statistic.",
     )

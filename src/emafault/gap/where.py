@@ -31,9 +31,15 @@ def where(problem: Problem, families: Sequence[Family]) -> list[dict]:
 
 
 def beyond_specification(families: Sequence[Family]) -> list[dict]:
-    """What a fit has moved far from its specification or measurement: parameter, equation, ``z`` as in ``where``."""
-    found = [f for f in families if f.along == SPECIFICATION and f.excess >= VISIBLE]
-    return [{"parameter": f.label, "equation": f.equation, "z": round(f.excess, 2)} for f in found]
+    """What a fit has moved far from its specification or measurement: parameter, equation, how many of its standard
+    deviations (root mean square where several recordings have one each), ``z`` as in ``where``."""
+    out = []
+    for f in families:
+        if f.along == SPECIFICATION and f.excess >= VISIBLE:
+            deviations = float(np.sqrt(1.0 + f.excess * np.sqrt(2.0 / f.size)))
+            entry = {"parameter": f.label, "equation": f.equation, "deviations": round(deviations, 1)}
+            out.append(entry | {"z": round(f.excess, 2)})
+    return out
 
 
 def equation_of(families: Sequence[Family]) -> str:

@@ -68,8 +68,7 @@ def finding(verdict: Mapping[str, Any]) -> str:
                 )
         moved = (verdict.get("beyond_specification") or [{"z": 0.0}])[0]
         if moved["z"] > (where[0]["z"] if where else 0.0):
-            name = moved["parameter"].replace(".", " ").replace("_", " ")
-            return text + f" To come near, the fit moves {name} far from its specification."
+            return text + f" To come near, the fit moves {moved_words(moved)}."
         return text + (f" The difference is largest in {_place(where[0])}." if where else "")
     claimed, held_out = _held_out(verdict)
     names = effect_words(first["effects"])
@@ -88,6 +87,12 @@ def finding(verdict: Mapping[str, Any]) -> str:
         remains = verdict.get("remains") or []
         text += " A remainder stays unexplained" + (f", largest in {_place(remains[0])}." if remains else ".")
     return text + held_out
+
+
+def moved_words(entry: Mapping[str, Any]) -> str:
+    """One entry of ``beyond_specification`` in words."""
+    name = entry["parameter"].replace(".", " ").replace("_", " ")
+    return f"{name} {number(entry['deviations'])} standard deviations from its specification"
 
 
 def _held_out(verdict: Mapping[str, Any]) -> tuple[bool, str]:
