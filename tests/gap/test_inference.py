@@ -108,14 +108,14 @@ def test_what_the_library_lacks_is_left_over_and_called_unknown():
 
 def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
     twin = Lines(6, library=())
-    # the unit's slope is specified to 0.02; the recordings have it 0.2 away
-    twin.parameters[1] = Parameter("unit.slope", "1", 1.0, 1.0, 0.02, -5, 5, 0.01, specified="line")
+    # the unit's slope is specified to 0.02; the recordings have it 0.4 away
+    twin.parameters[1] = Parameter("unit.slope", "1", 0.8, 0.8, 0.02, -5, 5, 0.01, specified="line")
     problem = Problem(twin, ["one", "two"])
     found = search(problem, (), 3.0)
     worst = found.null_families[0]
     assert (worst.equation, worst.label, worst.along) == ("line", "unit.slope", SPECIFICATION)
     moved = beyond_specification(found.null_families)[0]
-    pull = abs(found.null.values[1] - 1.0) / 0.02
+    pull = abs(found.null.values[1] - 0.8) / 0.02
     assert moved["parameter"] == "unit.slope" and moved["deviations"] == pytest.approx(pull, abs=0.06)
     assert equation_of(found.null_families) == "line"
     assert all(f.along != SPECIFICATION for f in found.regions)
