@@ -69,7 +69,7 @@ class Evidence:
     gain: float  # of the best set over the empty set, in log evidence
     null_excess: float  # largest family excess of the null fit
     excess: float  # largest family excess that the best set leaves
-    unexplained: float  # share of what the null's objective has in excess that the best set leaves
+    unexplained: float  # share of the null's excess that the best set leaves
     margin: float  # gain over the best rival outside the group
     dof: int
 
@@ -106,8 +106,7 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
         if c.effects not in inside and not (set(c.effects) > names or set(c.effects) < names)
     ]
     margin = best.gain - max([*rivals, 0.0])
-    # with the priors' part: a parameter far outside its tolerance is a gap that the null hides in its nuisances
-    before, after = found.null.objective - dof, best.point.objective - dof
+    before, after = problem.excess(found.null)[0], problem.excess(best.point)[0]
     unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
     return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
 

@@ -60,8 +60,7 @@ def families(problem: Problem, point: Point, widened: Sequence[int] = ()) -> lis
     """
     z = (problem.observed - point.prediction) / problem.deviations()
     groups: dict[tuple[str, str, str], list[float]] = {}
-    # how exactly an actuator hunts about its target proves nothing where other recordings are there to judge by
-    judging = [name for name in problem.part if not problem.erratic(name)] or list(problem.part)
+    judging = problem.judging
     for cell, value in zip(problem.cells, z, strict=True):
         if cell.recording not in judging:
             continue
@@ -188,13 +187,11 @@ def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dic
     A cause written in another form leaves a remainder, and some other effect always takes a little of it up: where even
     the larger set does not fit, the one more effect must take up most of it.
     """
-    size = len(problem.cells)
 
     def idle(part: Candidate, whole: Candidate) -> bool:
-        # with the priors' part, in which a calibration effect's gap stands
-        left = part.point.objective - size
-        share = DESERVED if whole.point.objective < FITS * size else MOST_OF_IT
-        return part.point.objective - whole.point.objective < share * left
+        (before, size), (after, _) = problem.excess(part.point), problem.excess(whole.point)
+        share = DESERVED if after < (FITS - 1.0) * size else MOST_OF_IT
+        return before - after < share * before
 
     while ranked[0].polished:
         members = set(ranked[0].effects)
