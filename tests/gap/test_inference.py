@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, share_left
+from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, evidence_of, share_left
 from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
@@ -133,6 +133,22 @@ def test_beside_a_remainder_one_more_effect_must_take_up_most_of_it(other_form):
     named = set(found.candidates[0].effects)
     assert named == ({"curve"} if other_form else {"curve", "step"})
     assert found.candidates[0].polished
+
+
+def test_what_is_left_is_judged_where_nothing_hunts():
+    twin = Lines(9, curvature=1.0)
+    twin.erratic = lambda name: name == "two"
+    twin.data["two"] = twin.data["two"] + 20.0 * twin.sigma * np.sign(np.sin(9 * twin.x))
+    problem = Problem(twin, ["one", "two"])
+    assert problem.judging == ["one"] and Problem(twin, ["two"]).judging == ["two"]
+    found = search(problem, twin.hypotheses, 3.0)
+    best = found.candidates[0]
+    assert best.effects == ("curve",)
+    everywhere = best.point.objective - len(problem.cells)
+    left, size = problem.excess(best.point)
+    assert size == len(twin.x) and left < 0.05 * everywhere
+    evidence, _ = evidence_of(problem, found)
+    assert evidence.unexplained < MOST
 
 
 class HalfTold(Lines):
