@@ -126,7 +126,7 @@ def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
 
 
 @pytest.mark.parametrize("other_form", [0.0, 0.9])
-def test_beside_a_remainder_one_more_effect_must_take_up_most_of_it(other_form):
+def test_beside_a_remainder_one_more_effect_must_take_up_a_good_part_of_it(other_form):
     twin = Lines(7, curvature=1.5, step=0.3, outside=other_form)
     problem = Problem(twin, ["one", "two"])
     found = search(problem, twin.hypotheses, 3.0)

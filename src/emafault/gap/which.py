@@ -17,8 +17,6 @@ STRONG = 30.0  # gain above which covariance and derivatives are taken anew at t
 REBASES = 3
 CLOSE = 1000.0  # gain below which the empty set is fitted a second time: it may have stopped on its way
 DESERVED = 0.3  # share of what a set leaves that one more effect must take up
-MOST_OF_IT = 0.5  # the same where something is left even then
-FITS = 1.2  # objective per statistic up to which nothing is left
 WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
 COMPARED = 4  # candidates that are compared without it
 SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
@@ -184,14 +182,12 @@ def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]
 def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
     """Give way to a smaller set where what the larger one adds is little of what the smaller one leaves.
 
-    A cause written in another form leaves a remainder, and some other effect always takes a little of it up: where even
-    the larger set does not fit, the one more effect must take up most of it.
+    A cause written in another form leaves a remainder, and some other effect always takes a little of it up.
     """
 
     def idle(part: Candidate, whole: Candidate) -> bool:
-        (before, size), (after, _) = problem.excess(part.point), problem.excess(whole.point)
-        share = DESERVED if after < (FITS - 1.0) * size else MOST_OF_IT
-        return before - after < share * before
+        before, after = problem.excess(part.point)[0], problem.excess(whole.point)[0]
+        return before - after < DESERVED * before
 
     while ranked[0].polished:
         members = set(ranked[0].effects)
