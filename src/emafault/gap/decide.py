@@ -106,7 +106,7 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
         if c.effects not in inside and not (set(c.effects) > names or set(c.effects) < names)
     ]
     margin = best.gain - max([*rivals, 0.0])
-    before, after = problem.excess(found.null)[0], problem.excess(best.point)[0]
+    before, after = problem.excess(found.null), problem.excess(best.point)
     unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
     return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
 

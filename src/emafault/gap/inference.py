@@ -89,14 +89,14 @@ class Problem:
         others are there."""
         return [name for name in self.part if not self.erratic(name)] or list(self.part)
 
-    def excess(self, point: "Point") -> tuple[float, int]:
-        """What a fit's objective is above its expectation, and of how many statistics; of the judging recordings.
+    def excess(self, point: "Point") -> float:
+        """What a fit's objective is above its expectation, of the judging recordings.
 
         With the priors' part, in which the gap of a parameter far outside its tolerance stands.
         """
         residual = self.whiten(self.observed - point.prediction)
         rows = np.concatenate([self.rows[name] for name in self.judging if name in self.rows])
-        return float(np.square(residual[rows]).sum() + point.objective - point.misfit - len(rows)), len(rows)
+        return float(np.square(residual[rows]).sum() + point.objective - point.misfit - len(rows))
 
     # ---- whitening
     def set_covariance(self, values: np.ndarray, shy: bool = False) -> None:

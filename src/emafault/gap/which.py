@@ -186,7 +186,7 @@ def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dic
     """
 
     def idle(part: Candidate, whole: Candidate) -> bool:
-        before, after = problem.excess(part.point)[0], problem.excess(whole.point)[0]
+        before, after = problem.excess(part.point), problem.excess(whole.point)
         return before - after < DESERVED * before
 
     while ranked[0].polished:
@@ -201,10 +201,13 @@ def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dic
 def _finished(problem: Problem, null: Point, candidate: Candidate, by_id: dict[str, Hypothesis]) -> Candidate:
     """The candidate fitted to the end, its prediction averaged where single ones scatter."""
     done = problem.polish(null, candidate, by_id)
-    if not problem.scatters:
-        return done
-    point = problem.averaged(done.point, [by_id[e] for e in done.effects])
-    return replace(done, point=point, gain=point.log_evidence - null.log_evidence)
+    return _averaged(problem, null, done, by_id) if problem.scatters else done
+
+
+def _averaged(problem: Problem, null: Point, candidate: Candidate, by_id: dict[str, Hypothesis]) -> Candidate:
+    """The candidate with its prediction averaged over the scatter of single ones."""
+    point = problem.averaged(candidate.point, [by_id[e] for e in candidate.effects])
+    return replace(candidate, point=point, gain=point.log_evidence - null.log_evidence)
 
 
 def _without_luck(
@@ -226,14 +229,9 @@ def _without_luck(
     elif len(leading) == 1:
         return null, candidates
     rest = candidates[len(leading) :]
-
-    def averaged(c: Candidate) -> Candidate:
-        point = problem.averaged(c.point, [by_id[e] for e in c.effects])
-        return replace(c, point=point, gain=point.log_evidence - null.log_evidence)
-
-    ranked = _ranked([*map(averaged, leading), *rest], addition)
+    ranked = _ranked([*(_averaged(problem, null, c, by_id) for c in leading), *rest], addition)
     if not ranked[0].polished:
-        ranked[0] = averaged(problem.polish(null, ranked[0], by_id))
+        ranked[0] = _finished(problem, null, ranked[0], by_id)
         ranked = _ranked(ranked, addition)
     return null, ranked
 

@@ -1,7 +1,6 @@
 """Parameters and hypotheses of the reference actuator: priors, where fits start, what a verdict says of a fit."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -73,8 +72,10 @@ def parameters_of(
             )
     for name, recording in recordings.items():
         dT = recording.ambient_temperature - actuator.reference_temperature
-        soak = Parameter(f"{name}.dT", "K", dT, dT, SOAK_DEVIATION, dT - 5, dT + 5, 3.0, None, (name,), "dT")
-        out.append(replace(soak, specified="electrical"))
+        sd, low, high = SOAK_DEVIATION, dT - 5, dT + 5
+        out.append(
+            Parameter(f"{name}.dT", "K", dT, dT, sd, low, high, 3.0, None, (name,), "dT", specified="electrical")
+        )
     for effect in effects.values():
         if effect.kind == "calibration":
             continue
