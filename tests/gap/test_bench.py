@@ -180,3 +180,13 @@ def test_steps_alone_neither_explore_nor_confirm(shop):
     assert len(steps) == 2
     for side in split_bench(bench):
         assert not set(side) <= steps
+
+
+def test_the_one_recording_of_large_currents_explores(shop):
+    quiet, hard = ("sine", {"amplitude": 0.004, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    for place in range(4):
+        plans = [(*(hard if n == place else quiet), 20.0 * n, "unknown") for n in range(4)]
+        bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+        largest = max(bench, key=lambda n: np.abs(bench[n].phase_current).max())
+        assert largest == sorted(bench)[place]
+        assert largest in split_bench(bench)[0]

@@ -1,5 +1,7 @@
 """The machine-independent core against closed forms, on a linear twin that has nothing to do with an actuator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
-from emafault.gap.which import SPECIFICATION, families, search
+from emafault.gap.which import SPECIFICATION, _fitted_alike, families, groups, search
 
 
 class Lines:
@@ -214,3 +216,61 @@ def test_closed_share_and_its_absence_below_the_noise():
     assert share_left(1.0, 1.0, 400) is None
     worse = share_left(2.0, 2.5, 400)
     assert worse is not None and worse > 1.0
+
+
+class Specified(Lines):
+    """The slope is specified to a tenth."""
+
+    def __init__(self, seed, slope=1.2):
+        super().__init__(seed)
+        self.data = {n: y + (slope - 1.2) * self.x for n, y in self.data.items()}
+        slope_of_unit = Parameter("unit.slope", "1", 1.2, 1.2, 0.1, -5, 5, 0.01, specified="line")
+        self.parameters = [self.parameters[0], slope_of_unit, *self.parameters[2:]]
+
+
+@pytest.mark.parametrize("slope", [1.2, 2.0])
+def test_a_fit_carried_off_by_what_it_hardly_sees_finds_back(slope):
+    twin = Specified(11, slope)
+    problem = Problem(twin, ["one", "two"])
+    fitted = problem.fit_null()
+    assert fitted.values[1] == pytest.approx(slope, abs=0.1)
+    away = fitted.values.copy()
+    away[1] = 1.2 + 5.0 * 0.1
+    misled = fitted.jacobian.copy()
+    misled[:, problem.nuisances.index(1)] *= -1.0  # derivatives made of scatter
+    stuck = problem.descend(problem.point(away, problem.predict(away)[0], misled, problem.nuisances))
+    back = problem.unpulled(stuck)
+    if slope == 1.2:
+        assert stuck.values[1] > 1.5 and back.objective < 0.5 * stuck.objective
+        assert back.values[1] == pytest.approx(1.2, abs=0.05)
+    else:  # where the data want it there it stays
+        assert problem.unpulled(fitted) is fitted
+
+
+class Alike(Lines):
+    """A second name for the curve, with an amplitude in which fits go slowly."""
+
+    def __init__(self, seed, curvature):
+        super().__init__(seed, curvature=curvature, library=("curve",))
+        self.parameters.append(Parameter("bend.a", "1", 0.0, 0.0, 1.0, -5, 5, 0.01, "bend"))
+        self.hypotheses.append(Hypothesis("bend", ("line",), ("bend.a",), ((0.9,),)))
+
+    def predict(self, values, part):
+        x = np.tile(self.x, len(part))
+        return super().predict(values, part) + np.array([v[4] ** 5 * x**2 for v in np.atleast_2d(values)])
+
+
+def test_a_rival_is_not_outdone_for_lack_of_convergence():
+    twin = Alike(13, curvature=3.0)
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    by_id = {h.effect: h for h in twin.hypotheses}
+    curve, bend = (problem.refine(null, c, by_id) for c in problem.screen(null, twin.hypotheses))
+    values = problem.polish(null, bend, by_id).point.values.copy()
+    values[-1] -= 0.01  # where a fit might have stopped
+    short = problem.point(values, problem.predict(values)[0], bend.point.jacobian, bend.point.free)
+    short = replace(bend, point=short, gain=short.log_evidence - null.log_evidence)
+    assert curve.gain - short.gain > 5.0
+    assert len(groups(problem, null, [curve, short])[0]) == 1
+    ranked = _fitted_alike(problem, null, [curve, short], by_id, 3.0)
+    assert {c.effects for c in groups(problem, null, ranked)[0]} == {("curve",), ("bend",)}

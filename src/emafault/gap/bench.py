@@ -399,10 +399,21 @@ def _allowed(recordings: Mapping[str, Recording], explore: Sequence[str], confir
     return all(recordings[n].health in ("seeded", *inside) for n in confirm)
 
 
+def _largest_current(recording: Recording) -> float:
+    """Current (A) that a hundredth of a recording exceeds in some phase."""
+    return max(float(np.quantile(np.abs(recording.phase_current), 0.99)), 1e-9)
+
+
+def _largest_speed(recording: Recording) -> float:
+    """Speed (rad/s) that a hundredth of a recording exceeds."""
+    return max(float(np.quantile(np.abs(recording.rotor_speed), 0.99)), 1e-9)
+
+
 def _cost(
     recordings: Mapping[str, Recording], explore: Sequence[str], confirm: Sequence[str], steps: Set[str]
 ) -> float:
-    """What a split lacks: range of temperature, commands and directions in explore, spread and kinds in confirm."""
+    """What a split lacks: range of temperature, current, speed, commands and directions in explore, spread and kinds in
+    confirm."""
 
     def ambient(names: Sequence[str]) -> np.ndarray:
         return np.array([recordings[n].ambient_temperature for n in names])
@@ -420,6 +431,9 @@ def _cost(
     inside = kinds(explore)
     cost += 1.0 * sum(kind not in inside for kind in kinds(confirm)) / len(confirm)
     cost += 0.5 * (1.0 - len(set(kinds(confirm))) / len(confirm))
+    # what shows at large currents or high speeds alone must be there to be fitted
+    for reach in (_largest_current, _largest_speed):
+        cost += 1.0 - max(reach(recordings[n]) for n in explore) / max(reach(r) for r in recordings.values())
     healths = {r.health for r in recordings.values()}
     cost += 0.5 * sum(h not in {recordings[n].health for n in confirm} for h in healths) / len(healths)
     # after a step an actuator hunts, and how it does proves little: neither side is made of such recordings alone

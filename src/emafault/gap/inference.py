@@ -21,6 +21,7 @@ FAR = 2.0  # prior standard deviations that a round may move before noise, covar
 RENEWED = 4  # rounds in which noise and covariance may be
 WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of an amplitude's prior
 NO_MOVE = 2.0, 0.3  # prior standard deviations of a nuisance and an effect over which derivatives stay as they are
+PULLED = 3.0  # standard deviations of its specification from which a fit is tried once more without the pull
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
 
@@ -332,6 +333,21 @@ class Problem:
                 break
         return best
 
+    def unpulled(self, best: Point, widened: Sequence[int] = ()) -> Point:
+        """The fit, or a better one begun where what lies far from its specification is back at it.
+
+        What the data hardly tell may have been carried off on the way and not find back by derivatives made of scatter.
+        """
+        specified = [m for m in self.nuisances if self.parameters[m].specified and m not in widened]
+        far = [m for m in specified if abs(best.values[m] - self.mean[m]) > PULLED * self.sd[m]]
+        if not far:
+            return best
+        values = best.values.copy()
+        values[far] = self.mean[far]
+        back = self.point(values, self.predict(values)[0], best.jacobian, best.free, widened)
+        back = self.descend(back, widened)
+        return back if back.objective < best.objective else best
+
     def fit_null(self, rounds: int = 7) -> Point:
         """Fit of the nuisances alone; calls the twin's ``settle`` (noise, start angle) where it has one."""
         values = np.array([p.off if p.effect else p.mean for p in self.parameters])
@@ -369,18 +385,17 @@ class Problem:
                 break
             before = best.objective
         assert best is not None
-        return best
+        return self.unpulled(best)
 
-    def refit_null(self, null: Point, start: Point) -> Point:
-        """The null fitted once more from where a candidate's nuisances ended, so that both had the same chance."""
+    def refit_null(self, start: Point) -> Point:
+        """The null fitted from where a candidate's nuisances ended, so that both had the same chance."""
         values = start.values.copy()
         for m, p in enumerate(self.parameters):
             if p.effect is not None:
                 values[m] = p.off
         prediction = self.predict(values)[0]
         jacobian = self.derivatives(values, prediction)
-        again = self.descend(self.point(values, prediction, jacobian, self.nuisances))
-        return again if again.objective < null.objective else null
+        return self.descend(self.point(values, prediction, jacobian, self.nuisances))
 
     def rebase(self, null: Point, candidate: Candidate) -> Point:
         """Take noise, covariance and nuisance derivatives at a candidate's fit; returns the null refitted under them.
@@ -516,7 +531,7 @@ class Problem:
         columns = self._effect_columns(point, own)
         jacobian = np.concatenate([base, columns], axis=1)
         start = self.point(point.values, point.prediction, jacobian, point.free, widened)
-        best = self.descend(start, widened)
+        best = self.unpulled(self.descend(start, widened), widened)
         gain = best.log_evidence - null.log_evidence
         return replace(candidate, point=best, gain=gain, signature=columns, polished=True)
 

@@ -18,8 +18,10 @@ REBASES = 3
 CLOSE = 1000.0  # gain below which the empty set is fitted a second time: it may have stopped on its way
 DESERVED = 0.3  # share of what a set leaves that one more effect must take up
 WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
+NEARLY = 0.01  # of the first one's gain, within which a rival may only lack convergence
 COMPARED = 4  # candidates that are compared without it
 SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
+OFF = 1e-6  # of the range of an amplitude, within which it is zero
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 
 
@@ -83,9 +85,13 @@ def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
 
 
 def negligible(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether an effect is smaller than it ever is, where its realistic range does not begin at zero."""
+    """Whether an effect is off, or smaller than it ever is where its realistic range does not begin at zero."""
     own = [problem.parameters[m] for m in problem.effect_parameters(hypothesis)]
-    sizes = [(abs(point.values[problem.names[p.name]] - p.off), p.least) for p in own if p.least > 0.0]
+    sizes = [
+        (abs(point.values[problem.names[p.name]] - p.off), max(p.least, OFF * (p.high - p.low)))
+        for p in own
+        if p.amplitude or p.least > 0.0
+    ]
     return bool(sizes) and all(size < least for size, least in sizes)
 
 
@@ -155,16 +161,13 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             break
         beam = _best(tried, size)[:2]
     _prune(problem, null, tried, by_id, accept)
-    if tried and 0.0 < max(c.gain for c in tried.values()) < CLOSE:
-        again = problem.refit_null(null, max(tried.values(), key=lambda c: c.gain).point)
-        better = again.log_evidence - null.log_evidence
-        if again is not null and better > 0.0:
-            null, tried = again, {k: replace(c, gain=c.gain - better) for k, c in tried.items()}
-    candidates = _ranked(tried.values(), addition)
+    null, candidates = _null_again(problem, null, _ranked(tried.values(), addition))
     if candidates and candidates[0].gain > HOPELESS:
-        candidates[0] = problem.polish(null, candidates[0], by_id)
+        candidates = _fitted_alike(problem, null, candidates, by_id, addition)
+        null, candidates = _null_again(problem, null, candidates)
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
         candidates = _deserved(problem, null, candidates, by_id)
+        null, candidates = _null_again(problem, null, candidates, candidates[0].gain < WITHIN_LUCK)
     unfitted = families(problem, null)
     left = unfitted
     if candidates:
@@ -177,6 +180,41 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
     """Best first; an effect more must be worth it: ``addition`` is the prior odds against each further member."""
     return sorted(candidates, key=lambda c: addition * (len(c.effects) - 1) - c.gain)
+
+
+def _null_again(
+    problem: Problem, null: Point, candidates: list[Candidate], averaged: bool = False
+) -> tuple[Point, list[Candidate]]:
+    """The null begun once more where the first candidate's nuisances ended, for it may have stopped on its way.
+
+    ``averaged`` says that null and candidate are predictions averaged over their scatter.
+    """
+    if not candidates or not 0.0 < candidates[0].gain < CLOSE:
+        return null, candidates
+    again = problem.refit_null(candidates[0].point)
+    if averaged and problem.scatters:
+        again = problem.averaged(again)
+    better = again.log_evidence - null.log_evidence
+    if better <= 0.0 or again.objective >= null.objective:
+        return null, candidates
+    return again, [replace(c, gain=c.gain - better) for c in candidates]
+
+
+def _fitted_alike(
+    problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis], addition: float
+) -> list[Candidate]:
+    """The first candidate and those that come near it, fitted to the end: of a strong gap, what two fits lack in
+    convergence is more than what tells them apart."""
+    first = problem.polish(null, ranked[0], by_id)
+    members, near = set(first.effects), max(WITHIN_LUCK, NEARLY * first.gain)
+    rivals = [
+        c
+        for c in ranked[1:]
+        if first.gain - c.gain < near and not (set(c.effects) > members or set(c.effects) < members)
+    ][: COMPARED - 1]
+    done = [first, *(problem.polish(null, c, by_id) for c in rivals)]
+    done = [c for c in done if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
+    return _ranked([*done, *(c for c in ranked[1:] if not any(c is r for r in rivals))], addition)
 
 
 def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:

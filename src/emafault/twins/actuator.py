@@ -37,8 +37,7 @@ ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
 RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
-HUNTING = 10.0  # on the variance of what hunts: a few repeats about one point do not show all the ways it may go
-HUNTING_ASIDE = 25.0  # the same where enough other recordings are there to judge by
+HUNTING = 3.0  # on the variance of what hunts: the mean of a few repeats still scatters by more than fits differ
 FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
@@ -112,8 +111,6 @@ class ActuatorTwin:
         self.index = {p.name: m for m, p in enumerate(self.parameters)}
         spacings = [b.computed.values[LATTICE] for b in self._brought.values()]
         self.hypotheses = hypotheses_of(self.parameters, self.effects, spacings)
-        smooth = sum(not self.erratic(name) for name in recordings)
-        self._hunting = HUNTING_ASIDE if smooth >= 3 else HUNTING
         self._offset: dict[str, np.ndarray] = {}
         self._cache: dict[tuple[str, bytes], np.ndarray] = {}
 
@@ -456,7 +453,7 @@ class ActuatorTwin:
         # what scatters together counts once; as few repeats tell of it little, half is taken for independent
         out = TOGETHER * apart.T @ apart
         out[np.diag_indices(SIZE)] = variance
-        return out * (1.0 + 2.0 / len(repeats)) * (self._hunting if len(b.jumps) else 1.0)
+        return out * (1.0 + 2.0 / len(repeats)) * (HUNTING if len(b.jumps) else 1.0)
 
     def report(
         self, effect: str, values: Mapping[str, float], deviations: Mapping[str, float]
