@@ -233,3 +233,22 @@ def test_corners_of_a_command_between_its_samples_are_put_in(name, settings, cor
     missed = np.abs(np.interp(at_ticks, time, recorded) - true)[inside].max()
     left = np.abs(np.interp(at_ticks, knots, values) - true)[inside].max()
     assert left < 1e-3 * max(missed, 1e-6)
+
+
+@pytest.mark.parametrize("instant", [0.0301, 0.0303])
+def test_an_averaged_prediction_keeps_the_instant_of_a_step(shop, instant, monkeypatch):
+    recording = shop.record("step", {"amplitude": 0.01, "time": instant}, 20.0, "healthy", interval=4e-4)
+    twin = ActuatorTwin(ACTUATOR, {"step": recording}, NOISE)
+    values = np.array([p.off if p.effect else p.mean for p in twin.parameters])
+    twin.settle(values, ["step"])
+    ticks, simulated = [], twin._simulate
+
+    def counting(name, run, command=None):
+        if command is not None:
+            ticks.append(int(np.argmax(command > 0.005)))
+        return simulated(name, run, command)
+
+    monkeypatch.setattr(twin, "_simulate", counting)
+    twin.smooth(values, ["step"])
+    true = int(np.argmax(command_positions("step", {"amplitude": 0.01, "time": instant}, 0.5, 1e-4) > 0.005))
+    assert ticks and max(abs(tick - true) for tick in ticks) <= 1

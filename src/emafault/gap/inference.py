@@ -5,7 +5,7 @@ Q = (y - mu)' C^-1 (y - mu) + sum ((theta - m)/s)^2; its log evidence is -Q/2 - 
 D = diag(s), up to a constant that all hypotheses share.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ FAR = 2.0  # prior standard deviations that a round may move before noise, covar
 RENEWED = 4  # rounds in which noise and covariance may be
 WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of an amplitude's prior
 NO_MOVE = 2.0, 0.3  # prior standard deviations of a nuisance and an effect over which derivatives stay as they are
+AVERAGED_STEPS = 2  # of a fit on averaged predictions, which cost several times as much
 PULLED = 3.0  # standard deviations of its specification from which a fit is tried once more without the pull
 LEASH = 2.0  # standard deviations that a unit's parameters may move in the first round of a null fit
 
@@ -150,10 +151,13 @@ class Problem:
         return hasattr(self.twin, "smooth")
 
     def averaged(self, point: Point, chosen: Sequence[Hypothesis] = ()) -> Point:
-        """The same fit with a prediction averaged over the twin's own scatter."""
+        """The fit with predictions averaged over the twin's own scatter, taken further where that shows the way."""
         widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
-        prediction = self.twin.smooth(point.values, self.part)  # type: ignore[attr-defined]
-        return self.point(point.values, prediction, point.jacobian, point.free, widened)
+        start = self.point(point.values, self._smooth(point.values), point.jacobian, point.free, widened)
+        return self.descend(start, widened, AVERAGED_STEPS, self._smooth)
+
+    def _smooth(self, values: np.ndarray) -> np.ndarray:
+        return self.twin.smooth(values, self.part)  # type: ignore[attr-defined]
 
     def nuisance_jacobian(
         self, values: np.ndarray, prediction: np.ndarray, free: Sequence[int], exact: bool = True
@@ -312,17 +316,24 @@ class Problem:
             width = max((np.where(own, factor, width) for factor in WIDTHS), key=of)
         return of(width) - len({o for o in owners if o is not None}) * float(np.log(len(WIDTHS)))
 
-    def descend(self, best: Point, widened: Sequence[int] = (), iterations: int = 4) -> Point:
+    def descend(
+        self,
+        best: Point,
+        widened: Sequence[int] = (),
+        iterations: int = 4,
+        predict: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> Point:
         """Gauss-Newton steps with the point's own derivatives, halved where they overshoot, until they gain nothing."""
+        predict = predict or (lambda values: self.predict(values)[0])
         for _ in range(iterations):
             moved = self.solve(best.values, best.prediction, best.jacobian, best.free, widened)
             if np.allclose(moved, best.values, rtol=0.0, atol=1e-12):
                 break
-            trial = self.point(moved, self.predict(moved)[0], best.jacobian, best.free, widened)
+            trial = self.point(moved, predict(moved), best.jacobian, best.free, widened)
             if trial.objective > best.objective:
                 for part in (0.4, 0.12):
                     nearer = best.values + part * (moved - best.values)
-                    trial = self.point(nearer, self.predict(nearer)[0], best.jacobian, best.free, widened)
+                    trial = self.point(nearer, predict(nearer), best.jacobian, best.free, widened)
                     if trial.objective < best.objective:
                         break
                 else:

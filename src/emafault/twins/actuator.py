@@ -37,9 +37,11 @@ ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
 RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
-HUNTING = 3.0  # on the variance of what hunts: the mean of a few repeats still scatters by more than fits differ
+HUNTING = 3.0  # on the variance of what hunts: trusted as far as its repeats scatter, it leads fits astray
 FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
+MOMENT_SCATTER = 0.1  # of the interval in which a step of the command came
+EARLIEST = 0.02  # of that interval; the sample before it still has the old command
 COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
 RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
 RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance and so the ripple's frequency
@@ -71,6 +73,7 @@ class _Brought:
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]  # of the bench, by channel
     theta_0: float
+    moment: float | None = None  # at which a step of the command came, from the sample before it to that after
     variances: dict[str, float] = field(default_factory=dict)  # of this recording's channels, as last compared
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
@@ -297,18 +300,21 @@ class ActuatorTwin:
         """A step of the command lies somewhere in its recording interval: take the instant that fits the angle best."""
         b = self._brought[name]
         until = min(len(b.recording.time), int(b.jumps[0, 1]) + max(10, round(0.015 / b.nominal.interval)))
-        best = np.inf
-        for part in (None, 0.0, 0.25, 0.5, 0.75, 0.9, 1.0):
-            command = self._command(b.recording, b.jumps, part)
+        tick = self.actuator.control_period / float(b.nominal.interval * np.min(np.diff(b.jumps, axis=1)))
+        tried: list[tuple[float, float | None, np.ndarray]] = []
+        for moment in (*np.arange(EARLIEST, 1.0, max(0.5 * tick, 0.1)), 1.0, None):
+            command = self._command(b.recording, b.jumps, moment)
             angle = self._simulate(name, run, command)["rotor_angle"]
-            error = float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2))
-            if error < best:
-                best, b.command = error, command
+            tried.append((float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2)), moment, command))
+        least = min(error for error, _, _ in tried)
+        # moments within one control tick are the same; the middle one is furthest from the next
+        alike = [t for t in tried if t[0] <= least * (1.0 + 1e-9)]
+        _, b.moment, b.command = alike[(len(alike) - 1) // 2]
 
-    def _command(self, recording: Recording, jumps: np.ndarray, part: float | None = None) -> np.ndarray:
+    def _command(self, recording: Recording, jumps: np.ndarray, moment: float | None = None) -> np.ndarray:
         """Command at the control ticks: linear between recorded values, but for jumps that happen at once.
 
-        ``part`` is the fraction of the time between the samples beside a jump after which it happens; None leaves it
+        ``moment`` is the fraction of the time between the samples beside a jump after which it happens; None leaves it
         linear.
         """
         interval = recording.interval
@@ -316,10 +322,10 @@ class ActuatorTwin:
         time = recording.time - (recording.time[0] - interval)
         position = recording.commanded_position
         time, position = with_corners(time, position)
-        if part is not None and len(jumps):
+        if moment is not None and len(jumps):
             recorded, (last, first) = recording.commanded_position, jumps.T
             begin, end = interval * (last + 1), interval * (first + 1)
-            moments = begin + part * (end - begin)
+            moments = begin + moment * (end - begin)
             within = np.any((time[:, None] > begin + 1e-9) & (time[:, None] < end - 1e-9), axis=1)
             time = np.concatenate([time[~within], moments - 1e-6, moments - 1e-9])
             position = np.concatenate([position[~within], recorded[last], recorded[first]])
@@ -431,9 +437,10 @@ class ActuatorTwin:
             moved["theta_0"] += turn
             moved["hysteresis"] *= 1.0 + band
             if len(b.jumps):
-                # when within its interval a step came is known to a part of it only
-                part = float(np.clip(0.5 + offset / COMMAND_SCATTER * 0.3, 0.0, 1.0))
-                command = self._command(b.recording, b.jumps, part) + offset
+                moment = b.moment
+                if moment is not None:  # it is known to a part of the interval only
+                    moment = float(np.clip(moment + MOMENT_SCATTER * offset / COMMAND_SCATTER, EARLIEST, 1.0))
+                command = self._command(b.recording, b.jumps, moment) + offset
             signals = self._simulate(name, moved, command)
             if len(b.jumps):
                 signals["commanded_position"] = signals["commanded_position"] + offset
