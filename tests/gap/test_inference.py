@@ -274,3 +274,29 @@ def test_a_rival_is_not_outdone_for_lack_of_convergence():
     assert len(groups(problem, null, [curve, short])[0]) == 1
     ranked = _fitted_alike(problem, null, [curve, short], by_id, 3.0)
     assert {c.effects for c in groups(problem, null, ranked)[0]} == {("curve",), ("bend",)}
+
+
+def test_an_effect_that_ends_off_is_no_candidate_and_the_null_has_what_it_found(monkeypatch):
+    twin = Lines(17)
+    twin.parameters = [replace(p, amplitude=p.effect is not None) for p in twin.parameters]
+    problem = Problem(twin, ["one", "two"])
+    fitted = Problem.fit_null
+
+    def stopped(self):
+        done = fitted(self)
+        values = done.values + np.array([0.2, 0.0, 0.0, 0.0])
+        return self.point(values, self.predict(values)[0], done.jacobian, self.nuisances)
+
+    def off(self, null, candidate, hypotheses):
+        point = candidate.point
+        values = np.array([*point.values[:2], 0.0, 0.0])
+        best = self.descend(self.point(values, self.predict(values)[0], 0.0 * point.jacobian, point.free))
+        return replace(candidate, point=best, gain=best.log_evidence - null.log_evidence, polished=True)
+
+    monkeypatch.setattr(Problem, "fit_null", stopped)
+    found = search(problem, twin.hypotheses, 3.0)
+    true = np.square((problem.observed - fitted(problem).prediction) / twin.sigma).sum()
+    assert found.null.misfit < true + 1.0
+    monkeypatch.setattr(Problem, "polish", off)
+    twin.data = Lines(17, curvature=1.0).data
+    assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates == []

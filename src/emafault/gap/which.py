@@ -165,6 +165,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     if candidates and candidates[0].gain > HOPELESS:
         candidates = _fitted_alike(problem, null, candidates, by_id, addition)
         null, candidates = _null_again(problem, null, candidates)
+    if candidates and candidates[0].gain > HOPELESS:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, candidates[0].gain < WITHIN_LUCK)
@@ -205,16 +206,24 @@ def _fitted_alike(
 ) -> list[Candidate]:
     """The first candidate and those that come near it, fitted to the end: of a strong gap, what two fits lack in
     convergence is more than what tells them apart."""
-    first = problem.polish(null, ranked[0], by_id)
+
+    def fitted(candidate: Candidate) -> Candidate | None:
+        done = problem.polish(null, candidate, by_id)
+        return None if any(negligible(problem, by_id[e], done.point) for e in done.effects) else done
+
+    first = None
+    while ranked and first is None:
+        first, ranked = fitted(ranked[0]), ranked[1:]
+    if first is None:
+        return []
     members, near = set(first.effects), max(WITHIN_LUCK, NEARLY * first.gain)
     rivals = [
         c
-        for c in ranked[1:]
+        for c in ranked
         if first.gain - c.gain < near and not (set(c.effects) > members or set(c.effects) < members)
     ][: COMPARED - 1]
-    done = [first, *(problem.polish(null, c, by_id) for c in rivals)]
-    done = [c for c in done if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
-    return _ranked([*done, *(c for c in ranked[1:] if not any(c is r for r in rivals))], addition)
+    done = [first, *(c for c in map(fitted, rivals) if c is not None)]
+    return _ranked([*done, *(c for c in ranked if not any(c is r for r in rivals))], addition)
 
 
 def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
