@@ -218,9 +218,7 @@ def _fitted_alike(
         return []
     members, near = set(first.effects), max(WITHIN_LUCK, NEARLY * first.gain)
     rivals = [
-        c
-        for c in ranked
-        if first.gain - c.gain < near and not (set(c.effects) > members or set(c.effects) < members)
+        c for c in ranked if first.gain - c.gain < near and not (set(c.effects) > members or set(c.effects) < members)
     ][: COMPARED - 1]
     done = [first, *(c for c in map(fitted, rivals) if c is not None)]
     return _ranked([*done, *(c for c in ranked if not any(c is r for r in rivals))], addition)
@@ -347,20 +345,25 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
 
 
 def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """The first candidate together with those that these data cannot tell from it."""
+    """The first candidate together with those that these data cannot tell from it.
+
+    Predictions that differ by no more than they scatter do not differ, nor are their sets told apart by how well each
+    happens to fall: a member's gain is that of the first one's prediction moved by what truly differs.
+    """
     if not candidates:
         return []
     first = candidates[0]
     members = [first]
     for other in candidates[1:]:
-        if set(other.effects) > set(first.effects) or set(other.effects) < set(first.effects):
+        if any(set(other.effects) >= set(m.effects) or set(other.effects) <= set(m.effects) for m in members):
             continue
-        apart = other.point.prediction - first.point.prediction
-        distance = problem.squared_distance(null, problem.whiten(problem.seen(apart)))
+        apart = problem.seen(other.point.prediction - first.point.prediction)
+        distance = problem.squared_distance(null, problem.whiten(apart))
+        moved = problem.whiten(problem.observed - first.point.prediction - apart)
+        gain = other.gain + 0.5 * (other.point.misfit - float(moved @ moved))
         # two predictions so far apart differ in log evidence by about as much from the noise of the data alone
-        alike = GROUP_DISTANCE / 2 + 2.0 * np.sqrt(problem.squared_distance(null, problem.whiten(apart)))
-        if distance < GROUP_DISTANCE and first.gain - other.gain < alike:
-            members.append(other)
+        if distance < GROUP_DISTANCE and first.gain - gain < GROUP_DISTANCE / 2 + 2.0 * np.sqrt(distance):
+            members.append(replace(other, gain=gain))
     return [members]
 
 
