@@ -167,6 +167,8 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         null, candidates = _null_again(problem, null, candidates)
     if candidates and candidates[0].gain > HOPELESS:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
+        candidates = [c for c in candidates if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
+    if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, candidates[0].gain < WITHIN_LUCK)
     unfitted = families(problem, null)

@@ -79,7 +79,6 @@ class _Brought:
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
     repeats: int = 1  # simulations behind a prediction
-    settled: int = 0  # how often noise has been taken
 
 
 class ActuatorTwin:
@@ -280,10 +279,9 @@ class ActuatorTwin:
         self._cache.clear()
 
     def _align(self, name: str, run: np.void) -> dict:
-        """Start angle and, at the first comparison, the instants of command steps; returns noise-free signals."""
+        """Start angle and the instants of command steps; returns noise-free signals."""
         b = self._brought[name]
-        b.settled += 1
-        if b.settled <= 2 and len(b.jumps):
+        if len(b.jumps):
             self._place_steps(name, run)
         clean = self._simulate(name, run)
         first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
