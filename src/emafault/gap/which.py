@@ -161,7 +161,21 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             break
         beam = _best(tried, size)[:2]
     _prune(problem, null, tried, by_id, accept)
-    null, candidates = _null_again(problem, null, _ranked(tried.values(), addition))
+    null, candidates = _concluded(problem, null, _ranked(tried.values(), addition), by_id, addition)
+    unfitted = families(problem, null)
+    left = unfitted
+    if candidates:
+        chosen = [by_id[e] for e in candidates[0].effects]
+        widened = [m for h in chosen if h.kind == "calibration" for m in problem.effect_parameters(h)]
+        left = families(problem, candidates[0].point, widened)
+    return Search(null, candidates, singles, left, unfitted)
+
+
+def _concluded(
+    problem: Problem, null: Point, candidates: list[Candidate], by_id: dict[str, Hypothesis], addition: float
+) -> tuple[Point, list[Candidate]]:
+    """The leading candidates fitted to the end and compared without luck, and the null given the same chances."""
+    null, candidates = _null_again(problem, null, candidates)
     if candidates and candidates[0].gain > HOPELESS:
         candidates = _fitted_alike(problem, null, candidates, by_id, addition)
         null, candidates = _null_again(problem, null, candidates)
@@ -171,13 +185,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, candidates[0].gain < WITHIN_LUCK)
-    unfitted = families(problem, null)
-    left = unfitted
-    if candidates:
-        chosen = [by_id[e] for e in candidates[0].effects]
-        widened = [m for h in chosen if h.kind == "calibration" for m in problem.effect_parameters(h)]
-        left = families(problem, candidates[0].point, widened)
-    return Search(null, candidates, singles, left, unfitted)
+    return null, candidates
 
 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
