@@ -130,7 +130,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
             continue
         best = set(e["candidates"][0][0])
         if key["case"]["left_out"] and _twins(best, truth):
-            continue  # no recording of one direction tells them apart: nothing to learn from
+            continue  # only a break-away tells them apart: nothing to learn from
         right = not key["case"]["left_out"] and _names(verdict, best, truth, key["detectability"]["members"])
         unexplained = np.log10(max(e["unexplained"], 1e-5))
         right_rows.append([1.0, gain, saturating(e["excess"]), unexplained, saturating(e["margin"])])
@@ -144,7 +144,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
 
 
 def _twins(one: set[str], other: set[str]) -> bool:
-    """Whether two sets are the pair of effects that are one and the same in motion of a single direction."""
+    """Whether two sets are the pair of effects that are one and the same torque in any motion."""
     return one | other == {"load_constant", "friction_asymmetry"}
 
 
