@@ -300,3 +300,31 @@ def test_an_effect_that_ends_off_is_no_candidate_and_the_null_has_what_it_found(
     monkeypatch.setattr(Problem, "polish", off)
     twin.data = Lines(17, curvature=1.0).data
     assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates == []
+
+
+class Scattering(Lines):
+    """Every prediction but that of the null scatters by itself, as a switched simulation does."""
+
+    def predict(self, values, part):
+        out = super().predict(values, part)
+        for row, v in zip(out, np.atleast_2d(values), strict=True):
+            if np.any(v[2:] != 0.0):
+                row += 0.7 * self.sigma * np.random.default_rng(5).standard_normal(len(row))
+        return out
+
+    def scatter(self, part):
+        return np.full(len(part) * len(self.x), (0.7 * self.sigma) ** 2)
+
+
+def test_the_scatter_of_a_start_is_no_misfit():
+    twin = Scattering(19, step=0.3)
+    twin.parameters = [replace(p, step=3.0) for p in twin.parameters]
+    twin.hypotheses = [replace(h, starts=((4.0,),)) for h in twin.hypotheses]
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    smooth = Problem(Lines(19, step=0.3), ["one", "two"])
+    gains = [
+        next(c.gain for c in p.screen(n, twin.hypotheses) if c.effects == ("step",))
+        for p, n in ((problem, null), (smooth, smooth.fit_null()))
+    ]
+    assert gains[1] > 10.0 and abs(gains[0] - gains[1]) < 3.0

@@ -408,6 +408,11 @@ class Problem:
         jacobian = self.derivatives(values, prediction)
         return self.descend(self.point(values, prediction, jacobian, self.nuisances))
 
+    def resumed(self, fit: Point, values: np.ndarray, chosen: Sequence[Hypothesis]) -> Point:
+        """A fit of these effects once more, from other values and with the derivatives that it has."""
+        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        return self.descend(self.point(values, self.predict(values)[0], fit.jacobian, fit.free, widened), widened)
+
     def rebase(self, null: Point, candidate: Candidate) -> Point:
         """Take noise, covariance and nuisance derivatives at a candidate's fit; returns the null refitted under them.
 
@@ -480,7 +485,11 @@ class Problem:
                 columns[:, c] = self.seen(full - predictions[at]) / (begin_at[c] - off[c])
             begin = null.values.copy()
             begin[own] = begin_at
-            out.append(self.linear(null, (h,), begin, full, columns))
+            if len(own) == 1:  # from where it is off, or the start's own scatter would count as misfit
+                line = self.linear(null, (h,), null.values, null.prediction, columns)
+                out.append(replace(line, start=begin))
+            else:
+                out.append(self.linear(null, (h,), begin, full, columns))
         return out
 
     def linear(

@@ -175,16 +175,16 @@ def _concluded(
     problem: Problem, null: Point, candidates: list[Candidate], by_id: dict[str, Hypothesis], addition: float
 ) -> tuple[Point, list[Candidate]]:
     """The leading candidates fitted to the end and compared without luck, and the null given the same chances."""
-    null, candidates = _null_again(problem, null, candidates)
+    null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > HOPELESS:
         candidates = _fitted_alike(problem, null, candidates, by_id, addition)
-        null, candidates = _null_again(problem, null, candidates)
+        null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > HOPELESS:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
         candidates = [c for c in candidates if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
-        null, candidates = _null_again(problem, null, candidates, candidates[0].gain < WITHIN_LUCK)
+        null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
     return null, candidates
 
 
@@ -194,9 +194,14 @@ def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]
 
 
 def _null_again(
-    problem: Problem, null: Point, candidates: list[Candidate], averaged: bool = False
+    problem: Problem,
+    null: Point,
+    candidates: list[Candidate],
+    by_id: dict[str, Hypothesis],
+    averaged: bool = False,
 ) -> tuple[Point, list[Candidate]]:
-    """The null begun once more where the first candidate's nuisances ended, for it may have stopped on its way.
+    """The null begun once more where the first candidate's nuisances ended, for it may have stopped on its way; where
+    that helped, the candidate from there in turn.
 
     ``averaged`` says that null and candidate are predictions averaged over their scatter.
     """
@@ -208,7 +213,17 @@ def _null_again(
     better = again.log_evidence - null.log_evidence
     if better <= 0.0 or again.objective >= null.objective:
         return null, candidates
-    return again, [replace(c, gain=c.gain - better) for c in candidates]
+    first, *rest = (replace(c, gain=c.gain - better) for c in candidates)
+    chosen = [by_id[e] for e in first.effects]
+    own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]
+    values = again.values.copy()
+    values[own] = first.point.values[own]
+    point = problem.resumed(first.point, values, chosen)
+    if averaged and problem.scatters:
+        point = problem.averaged(point, chosen)
+    if point.objective < first.point.objective:
+        first = replace(first, point=point, gain=point.log_evidence - again.log_evidence)
+    return again, [first, *rest]
 
 
 def _fitted_alike(
