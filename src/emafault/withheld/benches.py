@@ -56,14 +56,17 @@ def make_cases(
     return names
 
 
-def simulate_truth(case: Case, actuator: ActuatorParameters) -> list[dict[str, np.ndarray]]:
-    """Noise-free signals of each recording; a case with other forms runs on the other integrator."""
+def simulate_truth(case: Case, actuator: ActuatorParameters, step: float | None = None) -> list[dict[str, np.ndarray]]:
+    """Noise-free signals of each recording; a case with other forms runs on the other integrator.
+
+    ``step`` (s) lets every case run on it.
+    """
     out = []
     for plan in case.recordings:
         runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
         command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
-        if case.forms:
-            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, STEP, case.forms)
+        if case.forms or step is not None:
+            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, step or STEP, case.forms)
         else:
             signals = simulate(runs, command, plan.duration, plan.interval)
         out.append(signals)
@@ -71,10 +74,10 @@ def simulate_truth(case: Case, actuator: ActuatorParameters) -> list[dict[str, n
 
 
 def write_bench(
-    case: Case, folder: Path, actuator: ActuatorParameters, noise: SensorNoise
+    case: Case, folder: Path, actuator: ActuatorParameters, noise: SensorNoise, step: float | None = None
 ) -> list[dict[str, np.ndarray]]:
-    """Write a case's recordings and return their noise-free signals."""
-    truth = simulate_truth(case, actuator)
+    """Write a case's recordings and return their noise-free signals; ``step`` as in ``simulate_truth``."""
+    truth = simulate_truth(case, actuator, step)
     scaled = SensorNoise(**{k: v * case.noise_scale.get(k, 1.0) for k, v in asdict(noise).items()})
     for n, (plan, signals) in enumerate(zip(case.recordings, truth)):
         runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
