@@ -349,6 +349,7 @@ def split_bench(recordings: Mapping[str, Recording]) -> tuple[list[str], list[st
     if len(conditions) == 1 and len(names) > 1:
         conditions = [[n] for n in names]  # repetitions of one condition: by recording is all there is
     steps = {n for n in names if len(jumps_of(recordings[n].commanded_position))}
+    reach = {n: _reach(recordings[n]) for n in names}
     best: tuple[float, tuple[str, ...]] | None = None
     for size in range(1, len(conditions)):
         if size > number:
@@ -363,7 +364,7 @@ def split_bench(recordings: Mapping[str, Recording]) -> tuple[list[str], list[st
             explore = [n for n in names if n not in confirm]
             if not _allowed(recordings, explore, confirm):
                 continue
-            cost = _cost(recordings, explore, confirm, steps) + 2.0 * (number - len(confirm))
+            cost = _cost(recordings, explore, confirm, steps, reach) + 2.0 * (number - len(confirm))
             if best is None or (cost, confirm) < best:
                 best = (cost, confirm)
     held = list(best[1]) if best else []
@@ -399,18 +400,18 @@ def _allowed(recordings: Mapping[str, Recording], explore: Sequence[str], confir
     return all(recordings[n].health in ("seeded", *inside) for n in confirm)
 
 
-def _largest_current(recording: Recording) -> float:
-    """Current (A) that a hundredth of a recording exceeds in some phase."""
-    return max(float(np.quantile(np.abs(recording.phase_current), 0.99)), 1e-9)
-
-
-def _largest_speed(recording: Recording) -> float:
-    """Speed (rad/s) that a hundredth of a recording exceeds."""
-    return max(float(np.quantile(np.abs(recording.rotor_speed), 0.99)), 1e-9)
+def _reach(recording: Recording) -> np.ndarray:
+    """Current (A) and speed (rad/s) that a hundredth of a recording exceeds."""
+    signals = (recording.phase_current, recording.rotor_speed)
+    return np.array([max(float(np.quantile(np.abs(x), 0.99)), 1e-9) for x in signals])
 
 
 def _cost(
-    recordings: Mapping[str, Recording], explore: Sequence[str], confirm: Sequence[str], steps: Set[str]
+    recordings: Mapping[str, Recording],
+    explore: Sequence[str],
+    confirm: Sequence[str],
+    steps: Set[str],
+    reach: Mapping[str, np.ndarray],
 ) -> float:
     """What a split lacks: range of temperature, current, speed, commands and directions in explore, spread and kinds in
     confirm."""
@@ -432,8 +433,8 @@ def _cost(
     cost += 1.0 * sum(kind not in inside for kind in kinds(confirm)) / len(confirm)
     cost += 0.5 * (1.0 - len(set(kinds(confirm))) / len(confirm))
     # what shows at large currents or high speeds alone must be there to be fitted
-    for reach in (_largest_current, _largest_speed):
-        cost += 1.0 - max(reach(recordings[n]) for n in explore) / max(reach(r) for r in recordings.values())
+    largest = np.max([reach[n] for n in recordings], axis=0)
+    cost += float(np.sum(1.0 - np.max([reach[n] for n in explore], axis=0) / largest))
     healths = {r.health for r in recordings.values()}
     cost += 0.5 * sum(h not in {recordings[n].health for n in confirm} for h in healths) / len(healths)
     # after a step an actuator hunts, and how it does proves little: neither side is made of such recordings alone

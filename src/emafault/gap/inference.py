@@ -152,7 +152,7 @@ class Problem:
 
     def averaged(self, point: Point, chosen: Sequence[Hypothesis] = ()) -> Point:
         """The fit with predictions averaged over the twin's own scatter, taken further where that shows the way."""
-        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        _, widened = self.freed(chosen)
         start = self.point(point.values, self._smooth(point.values), point.jacobian, point.free, widened)
         return self.descend(start, widened, AVERAGED_STEPS, self._smooth)
 
@@ -355,8 +355,7 @@ class Problem:
             return best
         values = best.values.copy()
         values[far] = self.mean[far]
-        back = self.point(values, self.predict(values)[0], best.jacobian, best.free, widened)
-        back = self.descend(back, widened)
+        back = self.resumed(best, values, widened)
         return back if back.objective < best.objective else best
 
     def fit_null(self, rounds: int = 7) -> Point:
@@ -408,9 +407,8 @@ class Problem:
         jacobian = self.derivatives(values, prediction)
         return self.descend(self.point(values, prediction, jacobian, self.nuisances))
 
-    def resumed(self, fit: Point, values: np.ndarray, chosen: Sequence[Hypothesis]) -> Point:
-        """A fit of these effects once more, from other values and with the derivatives that it has."""
-        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+    def resumed(self, fit: Point, values: np.ndarray, widened: Sequence[int]) -> Point:
+        """A fit once more, from other values and with the derivatives that it has."""
         return self.descend(self.point(values, self.predict(values)[0], fit.jacobian, fit.free, widened), widened)
 
     def rebase(self, null: Point, candidate: Candidate) -> Point:
@@ -435,6 +433,12 @@ class Problem:
     def effect_parameters(self, hypothesis: Hypothesis) -> list[int]:
         """Indices of the hypothesis' parameters."""
         return [self.names[n] for n in hypothesis.parameters]
+
+    def freed(self, chosen: Sequence[Hypothesis]) -> tuple[list[int], list[int]]:
+        """What a set frees: parameters of its own, and nuisances whose prior it widens."""
+        own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
+        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        return own, widened
 
     def screen(self, null: Point, hypotheses: Sequence[Hypothesis]) -> list[Candidate]:
         """Linearised fit of every hypothesis at every start, from signatures simulated at the null fit."""
@@ -496,8 +500,7 @@ class Problem:
         self, null: Point, hypotheses: Sequence[Hypothesis], begin: np.ndarray, prediction: np.ndarray, signature
     ) -> Candidate:
         """Fit of nuisances and effects linearised about ``begin``; the null's nuisance derivatives are kept."""
-        own = [m for h in hypotheses for m in self.effect_parameters(h) if h.kind != "calibration"]
-        widened = [m for h in hypotheses for m in self.effect_parameters(h) if h.kind == "calibration"]
+        own, widened = self.freed(hypotheses)
         free = [*self.nuisances, *own]
         jacobian = np.concatenate([null.jacobian, signature], axis=1)
         values = self.solve(begin, prediction, jacobian, free, widened)
@@ -511,8 +514,7 @@ class Problem:
     ) -> Candidate:
         """Refit a candidate with the simulator: true prediction, effect derivatives renewed on the way."""
         chosen = [hypotheses[e] for e in candidate.effects]
-        own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
-        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        own, widened = self.freed(chosen)
         free = [*self.nuisances, *own]
         jacobian = candidate.point.jacobian.copy()
         jacobian[:, : len(self.nuisances)] = null.jacobian
@@ -544,8 +546,7 @@ class Problem:
         if candidate.polished:
             return candidate
         chosen = [hypotheses[e] for e in candidate.effects]
-        own = [m for h in chosen for m in self.effect_parameters(h) if h.kind != "calibration"]
-        widened = [m for h in chosen for m in self.effect_parameters(h) if h.kind == "calibration"]
+        own, widened = self.freed(chosen)
         point = candidate.point
         base = self.derivatives(point.values, point.prediction)
         columns = self._effect_columns(point, own)

@@ -166,7 +166,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     left = unfitted
     if candidates:
         chosen = [by_id[e] for e in candidates[0].effects]
-        widened = [m for h in chosen if h.kind == "calibration" for m in problem.effect_parameters(h)]
+        _, widened = problem.freed(chosen)
         left = families(problem, candidates[0].point, widened)
     return Search(null, candidates, singles, left, unfitted)
 
@@ -215,10 +215,10 @@ def _null_again(
         return null, candidates
     first, *rest = (replace(c, gain=c.gain - better) for c in candidates)
     chosen = [by_id[e] for e in first.effects]
-    own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]
+    own, widened = problem.freed(chosen)
     values = again.values.copy()
     values[own] = first.point.values[own]
-    point = problem.resumed(first.point, values, chosen)
+    point = problem.resumed(first.point, values, widened)
     if averaged and problem.scatters:
         point = problem.averaged(point, chosen)
     if point.objective < first.point.objective:
@@ -327,9 +327,7 @@ def _grow(
             if effect in base.effects:
                 continue
             chosen = [by_id[e] for e in (*base.effects, effect)]
-            own = [
-                m for e in base.effects for m in problem.effect_parameters(by_id[e]) if by_id[e].kind != "calibration"
-            ]
+            own, _ = problem.freed([by_id[e] for e in base.effects])
             inherited = base.point.jacobian[:, [base.point.free.index(m) for m in own]]
             if by_id[effect].kind == "calibration":
                 signature, begin = inherited, base.point.values
@@ -356,7 +354,7 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
         for effect in best.effects:
             kept = tuple(e for e in best.effects if e != effect)
             chosen = [by_id[e] for e in kept]
-            own = [m for h in chosen for m in problem.effect_parameters(h) if h.kind != "calibration"]
+            own, _ = problem.freed(chosen)
             begin = best.point.values.copy()
             for m in problem.effect_parameters(by_id[effect]):
                 begin[m] = problem.mean[m] if by_id[effect].kind == "calibration" else problem.parameters[m].off
