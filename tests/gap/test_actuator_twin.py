@@ -15,7 +15,7 @@ from emafault.gap.which import search
 from emafault.recording import Recording
 from emafault.twins.actuator import ActuatorTwin
 from emafault.twins.actuator_noise import channel_spread
-from emafault.twins.actuator_statistics import SIZE, SPECIFICATION, Nominal, compute
+from emafault.twins.actuator_statistics import COMMUTATIONS, SIZE, SPECIFICATION, Nominal, _shared, compute
 
 ACTUATOR = reference_actuator()
 NOISE = SensorNoise(**compose()["sensors"])
@@ -53,6 +53,32 @@ def test_statistics_are_as_many_as_specified_and_vanish_without_gap_or_noise():
     assert len(SPECIFICATION) == SIZE == len(found.values)
     plateau = [m for m, s in enumerate(SPECIFICATION) if s[0].startswith("plateau")]
     assert np.abs(found.values[plateau]).max() < 0.01  # V; the noise of one of them is about 0.05 V
+
+
+@pytest.mark.parametrize("inside", [-0.3, -0.11, -0.02, 0.0, 0.05, 0.19, 0.4])
+def test_share_of_a_phase_in_the_interval_of_an_ideal_commutation(inside):
+    span, x = 0.2, np.linspace(-0.2, 0.2, 200001)
+    own = np.mean(x + inside > 0.0)  # of the interval in which this phase carries the current, beside another
+    pair = 0.5 * ((own if inside >= 0.0 else 1.0 - own) + 1.0)
+    assert _shared(inside, span) == pytest.approx(own / pair, abs=1e-4)
+
+
+def test_where_commutations_fall_between_the_recording_instants_leaves_little_trace():
+    silent = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
+    commutation = [m for m, s in enumerate(SPECIFICATION) if s[0].split(" ")[-1] in COMMUTATIONS]
+    assert len(commutation) == 12
+    shares = []
+    for turn in np.linspace(0.0, 3e-3, 6):  # rad, a part of what the rotor turns in an interval
+        runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.4 + turn)
+        positions = command_positions("parabolic", {"acceleration": 0.4}, 0.5, ACTUATOR.control_period)
+        measured = measure(simulate(runs, positions, 0.5, 4e-4), runs, silent, 0)
+        soak = float(measured.pop("ambient_temperature")[0])
+        recording = Recording(
+            time_axis(0.5, 4e-4), ambient_temperature=soak, attributes={}, **{k: v[0] for k, v in measured.items()}
+        )
+        found = compute(Nominal.of(ACTUATOR, recording, 0.4 + turn), signals_of(recording))
+        shares.append((found.values / np.sqrt(found.norm))[commutation])
+    assert np.std(shares, axis=0).max() < 0.0015  # 0.007 where the instants count
 
 
 def signals_of(recording):

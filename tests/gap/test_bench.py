@@ -7,7 +7,7 @@ import pytest
 
 from emafault.actuator.commands import jumps_of
 from emafault.errors import InputError
-from emafault.gap.bench import check_bench, read_bench, split_bench
+from emafault.gap.bench import check_bench, read_bench, refuse_mistaken, split_bench
 from emafault.recording import write_recording
 
 SWAPPED = [1, 0, 2]
@@ -107,6 +107,18 @@ def test_a_good_bench_passes_whole_with_strong_effects_too(plain, shop):
         assert len(found.recordings) == 4, effect
     # without noise values repeat exactly, which must not count as clipping
     assert len(check_bench("bench", shop.make_bench(clean=True), shop.actuator).recordings) == 4
+
+
+def test_a_coarsely_truncated_speed_is_no_mistaken_sensor_but_a_wrong_sign_or_unit_is(plain, shop):
+    recording = plain[NAME]
+    time = recording.interval * np.arange(1, len(recording.time) + 1)
+    angle = 0.6 * (1.0 - np.cos(2.0 * np.pi * 1.7 * time))
+    speed = np.gradient(angle, recording.interval)
+    slow = replace(recording, rotor_angle=angle, output_position=angle / shop.actuator.gear_ratio)
+    refuse_mistaken(NAME, replace(slow, rotor_speed=3.7 * np.floor(speed / 3.7)), shop.actuator)
+    for wrong in (-speed, speed * 30.0 / np.pi):
+        with pytest.raises(InputError, match="rotor_speed"):
+            refuse_mistaken(NAME, replace(slow, rotor_speed=wrong), shop.actuator)
 
 
 def test_two_units_copies_and_broken_files(plain, shop, tmp_path):

@@ -10,7 +10,7 @@ from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
-from emafault.gap.which import SPECIFICATION, _fitted_alike, families, groups, search
+from emafault.gap.which import SPECIFICATION, _fitted_alike, families, groups, left_where_acting, search
 
 
 class Lines:
@@ -123,7 +123,7 @@ def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
     assert all(f.along != SPECIFICATION for f in found.regions)
     widened = families(problem, found.null, widened=[1])
     assert all(f.label != "unit.slope" for f in widened)
-    decision = decide(problem, found, (), Calibration.load())
+    decision = decide(problem, found, twin.hypotheses, Calibration.load())
     assert decision.verdict == "unknown"
 
 
@@ -137,6 +137,53 @@ def test_beside_a_remainder_one_more_effect_must_take_up_a_good_part_of_it(other
     assert found.candidates[0].polished
 
 
+class Besides(Lines):
+    """The second recording measures something else, which no cause of the library moves."""
+
+    def __init__(self, seed, beside, **others):
+        super().__init__(seed, **others)
+        self.data["two"] = np.random.default_rng(seed).normal(0.0, self.sigma, 40) + beside * np.sin(9 * self.x)
+
+    def cells(self, part):
+        return [replace(c, equation="other", label="other") if c.recording == "two" else c for c in super().cells(part)]
+
+    def predict(self, values, part):
+        whole = super().predict(values, part)
+        return np.where(np.array([c.recording == "two" for c in self.cells(part)]), 0.0, whole)
+
+
+def test_a_cause_beside_a_larger_remainder_is_named_and_a_stand_in_is_not():
+    twin = Besides(3, beside=3.0, curvature=1.0)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    evidence, _ = evidence_of(problem, found, twin.hypotheses)
+    assert evidence.unexplained > 0.9 and evidence.acting < 0.02
+    assert decide(problem, found, twin.hypotheses, Calibration.load(UNCALIBRATED)).verdict == "partly"
+    # the same gap with its cause left out: what stands in for it leaves some of it where it acts
+    twin = Besides(3, beside=3.0, curvature=1.0, library=("step",))
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    stand_in = problem.refine(found.null, found.singles[0], {h.effect: h for h in twin.hypotheses})
+    assert left_where_acting(problem, found.null, stand_in.point) > 0.3
+    assert decide(problem, found, twin.hypotheses, Calibration.load(UNCALIBRATED)).verdict == "unknown"
+
+
+def test_a_step_that_promises_nothing_is_not_taken():
+    twin = Lines(5, curvature=0.5)
+    problem = Problem(twin, ["one", "two"])
+    null, asked = problem.fit_null(), []
+    start = problem.point(null.values + 0.3, problem.predict(null.values + 0.3)[0], null.jacobian, null.free)
+    moved = problem.solve(start.values, start.prediction, start.jacobian, start.free)
+
+    def predict(values):
+        asked.append(values)
+        return problem.predict(values)[0]
+
+    fit = problem.descend(start, predict=predict)
+    assert problem.promised(start, moved) == pytest.approx(start.objective - fit.objective)  # all is linear here
+    assert len(asked) == 1
+
+
 def test_what_is_left_is_judged_where_nothing_hunts():
     twin = Lines(9, curvature=1.0)
     twin.erratic = lambda name: name == "two"
@@ -148,8 +195,8 @@ def test_what_is_left_is_judged_where_nothing_hunts():
     assert best.effects == ("curve",)
     everywhere = best.point.objective - len(problem.cells)
     assert problem.excess(best.point) < 0.05 * everywhere
-    evidence, _ = evidence_of(problem, found)
-    assert evidence.unexplained < MOST
+    evidence, _ = evidence_of(problem, found, twin.hypotheses)
+    assert evidence.unexplained < MOST and evidence.acting < MOST
 
 
 class HalfTold(Lines):

@@ -16,9 +16,10 @@ def add(folder, name, effects, evidence, left_out=(), named=None):
     case = {"effects": {e: {} for e in effects}, "left_out": list(left_out)}
     detectability = {"nominal": 1e4, "members": dict.fromkeys(effects, 1e4)} if effects else None
     key = {"case": case, "detectability": detectability}
-    gain, null_excess, excess, unexplained = evidence
+    gain, null_excess, excess, left = evidence
     candidates = [[list(named or effects), gain]] if gain > 0 else []
-    found = {"gain": gain, "null_excess": null_excess, "excess": excess, "unexplained": unexplained, "margin": gain}
+    found = {"gain": gain, "null_excess": null_excess, "excess": excess, "unexplained": left, "acting": left}
+    found |= {"margin": gain, "dof": 100}
     verdict = {"evidence": found | {"candidates": candidates, "held_out": None}, "which": []}
     (folder / "keys").mkdir(parents=True, exist_ok=True)
     (folder / "diagnoses" / name).mkdir(parents=True)
@@ -53,8 +54,8 @@ def test_evidence_counts_one_way_only(tmp_path):
     for n in range(15):  # more gain, and wrong: chance must not turn the sense of the gain
         add(tmp_path, f"t4_{n}", ["stribeck"], (900.0, 60.0, 3.0, 1e-3), named=["backlash"])
     found = calibrate(tmp_path, START)
-    gain, excess, unexplained, margin = found.right[1:]
-    assert gain >= 0.0 >= excess and margin >= 0.0 >= unexplained
+    gain, unexplained, acting, margin = found.right[1:]
+    assert min(gain, margin) >= 0.0 >= max(unexplained, acting)
     assert min(found.gap[1:]) >= 0.0
 
 

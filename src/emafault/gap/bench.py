@@ -11,6 +11,7 @@ from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import detrend
 
 from ..actuator.commands import jumps_of
 from ..actuator.motor import AXIS
@@ -28,6 +29,10 @@ CLIPPED_LEAST = 20
 CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
 LOST = 2 * np.pi / 3  # from here on a sample cannot be told its sector
+DRIFT = (
+    3.0  # rad/s, below which a constant speed beside the angle's rate is no mistaken sensor: coarse truncation has it
+)
+BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
 SAME_CONDITION = 2.0  # K
 TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
 
@@ -123,7 +128,8 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     travel = float(np.ptp(theta))
     if travel > 1.0:
         by_speed = np.cumsum(recording.rotor_speed) * recording.interval
-        _refuse_unlike(path, "rotor_speed", "the rate of rotor_angle", theta, by_speed)
+        if not _alike_but_for_drift(theta, by_speed, recording.interval):
+            _refuse_unlike(path, "rotor_speed", "the rate of rotor_angle", theta, by_speed)
     if travel > 5.0:
         by_shaft = actuator.gear_ratio * (recording.output_position - recording.output_position[0])
         _refuse_unlike(
@@ -145,11 +151,25 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         _refuse_swapped_phases(path, recording, actuator)
 
 
-def _refuse_unlike(path: str, variable: str, what: str, wanted: np.ndarray, got: np.ndarray) -> None:
-    """Refuse ``got`` unless it follows ``wanted`` with a slope near one."""
+def _follows(wanted: np.ndarray, got: np.ndarray) -> tuple[bool, float, float]:
+    """Whether ``got`` goes with ``wanted``: slope near one and alike; both figures."""
     slope = float(wanted @ got / max(wanted @ wanted, 1e-30))
     likeness = float(np.corrcoef(wanted, got)[0, 1]) if np.ptp(got) > 0 else 0.0
-    if likeness < 0.8 or not 0.4 < slope < 2.5:
+    return likeness >= 0.8 and 0.4 < slope < 2.5, slope, likeness
+
+
+def _alike_but_for_drift(wanted: np.ndarray, got: np.ndarray, interval: float) -> bool:
+    """Whether an integrated speed follows an angle once a constant speed is taken off: a coarsely truncated speed has
+    one."""
+    time = np.arange(len(wanted)) * interval
+    drift, bent, other = np.polyfit(time, got - wanted, 1)[0], detrend(wanted), detrend(got)
+    return bool(abs(drift) < DRIFT and np.ptp(bent) > BENT and _follows(bent, other)[0])
+
+
+def _refuse_unlike(path: str, variable: str, what: str, wanted: np.ndarray, got: np.ndarray) -> None:
+    """Refuse ``got`` unless it follows ``wanted`` with a slope near one."""
+    follows, slope, likeness = _follows(wanted, got)
+    if not follows:
         raise InputError(
             f"{path}: {variable} is not {what} (slope {slope:.2g}, correlation {likeness:.2f}); "
             "sensors, units or signs are mistaken"

@@ -16,12 +16,13 @@ import numpy as np
 from ..errors import InputError
 from .how_far import square_error
 from .inference import Candidate, Problem
-from .which import Search, far_outside, groups
+from .twin import Hypothesis
+from .which import Search, far_outside, groups, left_where_acting
 
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration, and what machines without blind cases of their own are judged by
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
-MOST = 0.5  # share of the gap that a named set may leave, where it was fitted and on the confirm recordings
+MOST = 0.5  # share that a named set may leave, where it acts and of the gap on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more
 WITHDRAWN = 0.2  # the most that is believed of a set that leaves more
 
@@ -70,6 +71,7 @@ class Evidence:
     null_excess: float  # largest family excess of the null fit
     excess: float  # largest family excess that the best set leaves
     unexplained: float  # share of the null's excess that the best set leaves
+    acting: float  # share of the misfit left in the kinds of statistics that the best set acts on
     margin: float  # gain over the best rival outside the group
     dof: int
 
@@ -78,24 +80,25 @@ class Evidence:
         return np.array([1.0, saturating(self.gain), saturating(self.null_excess)])
 
     def right_features(self) -> np.ndarray:
-        """(1, log gain, log excess left, log share left, log margin)."""
+        """(1, log gain, log share left, log share left where the set acts, log margin)."""
         return np.array(
             [
                 1.0,
                 saturating(self.gain),
-                saturating(self.excess),
                 np.log10(max(self.unexplained, 1e-5)),
+                np.log10(max(self.acting, 1e-3)),
                 saturating(self.margin),
             ]
         )
 
 
-def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candidate]]:
+def evidence_of(problem: Problem, found: Search, hypotheses: Sequence[Hypothesis]) -> tuple[Evidence, list[Candidate]]:
     """Summary of a search and the group of its best set."""
+    by_id = {h.effect: h for h in hypotheses}
     dof = len(problem.cells)
     null_excess = found.null_families[0].excess if found.null_families else 0.0
     if not found.candidates:
-        return Evidence(0.0, null_excess, null_excess, 1.0, 0.0, dof), []
+        return Evidence(0.0, null_excess, null_excess, 1.0, 1.0, 0.0, dof), []
     group = groups(problem, found.null, found.candidates)[0]
     best = found.candidates[0]
     inside = {c.effects for c in group}
@@ -108,7 +111,9 @@ def evidence_of(problem: Problem, found: Search) -> tuple[Evidence, list[Candida
     margin = best.gain - max([*rivals, 0.0])
     before, after = problem.excess(found.null), problem.excess(best.point)
     unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
-    return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, margin, dof), group
+    _, widened = problem.freed([by_id[e] for e in best.effects])
+    acting = left_where_acting(problem, found.null, best.point, widened)
+    return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, acting, margin, dof), group
 
 
 def share_left(recalibrated: float, after: float, size: int) -> float | None:
@@ -143,19 +148,19 @@ class Decision:
 def decide(
     problem: Problem,
     found: Search,
-    hypotheses: Sequence,
+    hypotheses: Sequence[Hypothesis],
     calibration: Calibration,
     left: float | None = None,
 ) -> Decision:
     """Turn a search into a verdict by the frozen curves; ``left`` is what ``share_left`` says of it."""
-    evidence, group = evidence_of(problem, found)
+    evidence, group = evidence_of(problem, found, hypotheses)
     p_gap = _sigmoid(float(np.dot(calibration.gap, evidence.gap_features())))
     if not found.candidates:
         unknown = p_gap
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
     odds = float(np.dot(calibration.right, evidence.right_features()))
     p_right = calibration.most * _sigmoid(odds)
-    if evidence.unexplained > MOST or (left is not None and left > MOST):
+    if evidence.acting > MOST or (left is not None and left > MOST):
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()

@@ -327,7 +327,8 @@ class Problem:
         predict = predict or (lambda values: self.predict(values)[0])
         for _ in range(iterations):
             moved = self.solve(best.values, best.prediction, best.jacobian, best.free, widened)
-            if np.allclose(moved, best.values, rtol=0.0, atol=1e-12):
+            enough = max(0.1, 1e-3 * best.objective)
+            if self.promised(best, moved, widened) < enough:
                 break
             trial = self.point(moved, predict(moved), best.jacobian, best.free, widened)
             if trial.objective > best.objective:
@@ -338,11 +339,18 @@ class Problem:
                         break
                 else:
                     break
-            done = trial.objective > best.objective - max(0.1, 1e-3 * best.objective)
+            done = trial.objective > best.objective - enough
             best = trial
             if done:
                 break
         return best
+
+    def promised(self, point: Point, values: np.ndarray, widened: Sequence[int] = ()) -> float:
+        """What a point's objective would fall by at other values, were its prediction linear."""
+        free = list(point.free)
+        mean, sd = self.prior(free, widened)
+        residual = self.whiten(self.observed - point.prediction - point.jacobian @ (values - point.values)[free])
+        return point.objective - float(residual @ residual + (((values[free] - mean) / sd) ** 2).sum())
 
     def unpulled(self, best: Point, widened: Sequence[int] = ()) -> Point:
         """The fit, or a better one begun where what lies far from its specification is back at it.

@@ -6,7 +6,7 @@ the rung that leaves an effect out, which one the library lacks.
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..gap.bench import read_bench
-from ..gap.decide import UNCALIBRATED, Calibration, saturating
+from ..gap.decide import UNCALIBRATED, Calibration, Evidence
 from ..gap.run import diagnose_recordings
 from ..recording import replace_atomically
 from ..withheld.benches import make_cases
@@ -25,7 +25,8 @@ from ..withheld.cases import draw_case
 DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
 SURE = 0.9  # probability from which the second curve is taken at the share of its cases that were right
 PRIOR_WIDTH = 3.0  # of a coefficient about that of the uncalibrated curves
-#: which way gain and excess of the null count for a gap; and gain, excess and share left, and margin for the first set
+FIELDS = [f.name for f in fields(Evidence)]
+#: which way gain and excess of the null count for a gap; and gain, both shares left, and margin for the first set
 GAP_SENSES = (0, 1, 1)
 RIGHT_SENSES = (0, 1, -1, -1, 1)
 #: cases of the development draw stand above this seed, those of the scoreboard below
@@ -109,10 +110,10 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
     """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
 
     Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case
-    held a detectable gap, the second on whether the best set was right among cases that did. No set is given more than
-    the share of right ones among the cases that the second curve is sure of.
+    held a detectable gap, the second on whether the best set was right among cases that did and in which the first
+    curve sees it. No set is given more than the share of right ones among the cases that the second curve is sure of.
     """
-    gap_rows, gap_truth, right_rows, right_truth = [], [], [], []
+    gap_rows, gap_truth, seen, right_rows, right_truth = [], [], [], [], []
     for path in sorted((folder / "keys").glob("*.json")):
         verdict_path = folder / "diagnoses" / path.stem / "diagnosis.json"
         if not verdict_path.exists():
@@ -120,26 +121,27 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         key, verdict = json.loads(path.read_text()), json.loads(verdict_path.read_text())
         truth = set(key["case"]["effects"])
         distance = (key["detectability"] or {}).get("nominal", 0.0)
-        e = verdict["evidence"]
-        gain, excess = saturating(e["gain"]), saturating(e["null_excess"])
+        evidence = Evidence(**{name: verdict["evidence"][name] for name in FIELDS})
         # what the library lacks and leaves within the noise is no gap that these statistics could tell
         if not truth or (distance >= DETECTABLE and not key["case"]["left_out"]):
-            gap_rows.append([1.0, gain, excess])
+            gap_rows.append(evidence.gap_features())
             gap_truth.append(bool(truth))
-        if not e["candidates"] or not truth or distance < DETECTABLE:
+        if not verdict["evidence"]["candidates"] or not truth or distance < DETECTABLE:
             continue
-        best = set(e["candidates"][0][0])
+        best = set(verdict["evidence"]["candidates"][0][0])
         if key["case"]["left_out"] and _twins(best, truth):
             continue  # only a break-away tells them apart: nothing to learn from
         right = not key["case"]["left_out"] and _names(verdict, best, truth, key["detectability"]["members"])
-        unexplained = np.log10(max(e["unexplained"], 1e-5))
-        right_rows.append([1.0, gain, saturating(e["excess"]), unexplained, saturating(e["margin"])])
+        seen.append(evidence.gap_features())
+        right_rows.append(evidence.right_features())
         right_truth.append(right)
     gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap), GAP_SENSES)
-    names = _logistic(np.array(right_rows), np.array(right_truth), np.array(start.right), RIGHT_SENSES)
-    sure = 1.0 / (1.0 + np.exp(-np.array(right_rows) @ np.array(names))) > SURE
-    most = (np.sum(np.array(right_truth)[sure]) + 1.0) / (sure.sum() + 2.0)  # rule of succession
-    source = f"{len(gap_rows)} development cases for the first curve, {len(right_rows)} for the second"
+    asked = np.array(seen) @ np.array(gap) > 0.0
+    rows, truths = np.array(right_rows)[asked], np.array(right_truth)[asked]
+    names = _logistic(rows, truths, np.array(start.right), RIGHT_SENSES)
+    sure = 1.0 / (1.0 + np.exp(-rows @ np.array(names))) > SURE
+    most = (np.sum(truths[sure]) + 1.0) / (sure.sum() + 2.0)  # rule of succession
+    source = f"{len(gap_rows)} development cases for the first curve, {len(rows)} for the second"
     return Calibration(tuple(gap), tuple(names), start.addition, start.remainder, round(float(most), 4), source)
 
 

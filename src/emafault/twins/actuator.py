@@ -32,7 +32,7 @@ from .actuator_statistics import (
 )
 
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
-NOISE_REPEATS = 12
+NOISE_PAIRS = 4  # of noise and its negative, over which its bias of the statistics is averaged
 ROUNDED_ALIKE = 20  # samples
 JITTER_REPEATS = 8
 RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
@@ -42,7 +42,7 @@ FIRST_REPEATS = 4  # where a fit starts
 COMMAND_SCATTER = 2e-5  # rad, over which a motion that hunts about its target goes another way
 MOMENT_SCATTER = 0.1  # of the interval in which a step of the command came
 EARLIEST = 0.02  # of that interval; the sample before it still has the old command
-COMMUTATION_FLOOR = 0.02  # of the share of current around a commutation: how it falls between recording instants
+COMMUTATION_FLOOR = 0.007  # of the share of current around a commutation: what averaging over few of them leaves
 RIPPLE_SCATTER = 2e-3  # relative, of the comparator's band, over which the ripple falls differently
 RIPPLE_UNKNOWN = 1e-2  # the same where no current at an instant tells the inductance and so the ripple's frequency
 START_SCATTER = 2e-4, 2e-3  # rad, least and most over which commutations fall differently between recording instants
@@ -115,6 +115,7 @@ class ActuatorTwin:
         self.hypotheses = hypotheses_of(self.parameters, self.effects, spacings)
         self._offset: dict[str, np.ndarray] = {}
         self._cache: dict[tuple[str, bytes], np.ndarray] = {}
+        self._averages: dict[tuple[str, bytes], np.ndarray] = {}
 
     # ---- the recordings
     def _bring(self, recording: Recording) -> _Brought:
@@ -230,15 +231,16 @@ class ActuatorTwin:
     def _off(self, parameter: str) -> float:
         return self.parameters[self.index[parameter]].off
 
-    def _simulate(self, name: str, run: np.void, command: np.ndarray | None = None) -> dict:
+    def _simulate(self, name: str, run: np.void, command: np.ndarray | None = None, samples: int | None = None) -> dict:
+        """Signals of a run as long as the recording, or of its first ``samples``."""
         b = self._brought[name]
         command = b.command if command is None else command
-        n = len(b.recording.time)
+        n = samples or len(b.recording.time)
         arrays = [np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), *(np.empty(n) for _ in range(4))]
         run_actuator(run, command, b.nominal.interval, *arrays)
         keys = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle")
         out = dict(zip((*keys, "output_position", "bus_voltage"), arrays, strict=True))
-        out["commanded_position"] = b.signals["commanded_position"]
+        out["commanded_position"] = b.signals["commanded_position"][:n]
         return out
 
     def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
@@ -277,6 +279,7 @@ class ActuatorTwin:
                     self._brought[name].noise[channel] = value
             list(pool.map(lambda name: self._correct_bias(name, clean[name]), part))
         self._cache.clear()
+        self._averages.clear()
 
     def _align(self, name: str, run: np.void) -> dict:
         """Start angle and the instants of command steps; returns noise-free signals."""
@@ -302,8 +305,8 @@ class ActuatorTwin:
         tried: list[tuple[float, float | None, np.ndarray]] = []
         for moment in (*np.arange(EARLIEST, 1.0, max(0.5 * tick, 0.1)), 1.0, None):
             command = self._command(b.recording, b.jumps, moment)
-            angle = self._simulate(name, run, command)["rotor_angle"]
-            tried.append((float(np.sum((angle - b.signals["rotor_angle"])[:until] ** 2)), moment, command))
+            angle = self._simulate(name, run, command, until)["rotor_angle"]
+            tried.append((float(np.sum((angle - b.signals["rotor_angle"][:until]) ** 2)), moment, command))
         least = min(error for error, _, _ in tried)
         # moments within one control tick are the same; the middle one is furthest from the next
         alike = [t for t in tried if t[0] <= least * (1.0 + 1e-9)]
@@ -359,12 +362,12 @@ class ActuatorTwin:
         rng = np.random.default_rng(1)
         still = self._compared(name, clean)
         total = np.zeros(SIZE)
-        for _ in range(NOISE_REPEATS):
-            noisy = dict(clean)
-            for channel, signal in CHANNELS.items():
-                noisy[signal] = clean[signal] + b.noise[channel] * rng.standard_normal(clean[signal].shape)
-            total += self._compared(name, noisy)
-        self._offset[name] = total / NOISE_REPEATS - still
+        for _ in range(NOISE_PAIRS):
+            drawn = {s: b.noise[c] * rng.standard_normal(clean[s].shape) for c, s in CHANNELS.items()}
+            for sign in (1.0, -1.0):  # what is linear in the noise cancels: the bias is not
+                noisy = clean | {signal: clean[signal] + sign * noise for signal, noise in drawn.items()}
+                total += self._compared(name, noisy)
+        self._offset[name] = total / (2 * NOISE_PAIRS) - still
         self._offset[name][LATTICE] = 0.0
 
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
@@ -380,7 +383,6 @@ class ActuatorTwin:
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
-            cov *= 1.0 + 1.0 / NOISE_REPEATS
             # the recording scatters once and the simulations it is compared with once more
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
             cov += (1.0 + 1.0 / b.repeats) * jitter
@@ -413,8 +415,10 @@ class ActuatorTwin:
 
         def work(name: str) -> np.ndarray:
             run = self._runs(values[None, :], name)[0]
-            mean = np.mean(self._repeats(name, run, self._shifts(name)), axis=0) + self._offset.get(name, 0.0)
-            return mean[self._brought[name].usable]
+            key = (name, run.tobytes())
+            if key not in self._averages:
+                self._averages[key] = np.mean(self._repeats(name, run, self._shifts(name)), axis=0)
+            return (self._averages[key] + self._offset.get(name, 0.0))[self._brought[name].usable]
 
         with ThreadPoolExecutor(self.threads) as pool:
             return np.concatenate(list(pool.map(work, part)))

@@ -269,6 +269,19 @@ def lattice(values):
 
 
 @compiled
+def _shared(inside, span):
+    """Share of the pair's mean current that a phase has where an edge at which all current changes over at once lies
+    ``inside`` (rad) before the middle of an interval of half-width ``span`` (rad).
+
+    So where the edges fall between the recording instants, which no two runs have alike, leaves no trace.
+    """
+    if span < 1e-9:
+        return 1.0 if inside >= 0.0 else 0.0
+    part = min(max(0.5 + 0.5 * inside / span, 0.0), 1.0)
+    return 2.0 * part / (2.0 - part) if part < 0.5 else 2.0 * part / (1.0 + part)
+
+
+@compiled
 def fill_statistics(
     c, dt, has_end, has_bus, V, i, i_end, speed, theta, shaft, command, bus, y, norm, count, residual, store
 ):
@@ -470,14 +483,15 @@ def fill_statistics(
                 half = x[j] if x[j] < np.pi else x[j] - np.pi
                 share = min(max(sign[j] * i[n, j] / pair_mean[n], -0.5), 1.5)
                 base = _COMMUTATION + 4 * j
-                if 0.0 < ramp - half < WINDOW:
-                    _put(base, n, 1.0, share, y, norm, count, store)
-                elif 0.0 <= half - ramp < WINDOW:
-                    _put(base + 1, n, 1.0, share - 1.0, y, norm, count, store)
-                elif 0.0 < np.pi - ramp - half < WINDOW:
-                    _put(base + 2, n, 1.0, share - 1.0, y, norm, count, store)
-                elif 0.0 <= half - (np.pi - ramp) < WINDOW:
-                    _put(base + 3, n, 1.0, share, y, norm, count, store)
+                on, off = half - ramp, np.pi - ramp - half  # electrical angle inside the two edges
+                if -WINDOW < on < 0.0:
+                    _put(base, n, 1.0, share - _shared(on, span), y, norm, count, store)
+                elif 0.0 <= on < WINDOW:
+                    _put(base + 1, n, 1.0, share - _shared(on, span), y, norm, count, store)
+                elif 0.0 < off < WINDOW:
+                    _put(base + 2, n, 1.0, share - _shared(off, span), y, norm, count, store)
+                elif -WINDOW < off <= 0.0:
+                    _put(base + 3, n, 1.0, share - _shared(off, span), y, norm, count, store)
     # ---- the regulator's residual beside the slope of its reference, smooth so that noise does not drown it
     reach = int(max(1.0, round(REGULATOR_SMOOTHING / dt)))
     total = np.zeros(n_time + 1)

@@ -19,6 +19,7 @@ from .statistics import Unit, View, coarser, less, simulate_plan
 LATTICE = 1e6  # squared distance by which rounded values differ from unrounded ones: one look at them tells
 PLAIN = 1e6  # above it a squared distance to the nominal model is not refined
 SCATTER = 2.0  # half would be one run's variance; derivatives carry the scatter of several
+LINEAR = 2.0  # prior standard deviations that no nuisance leaves where the first order is believed
 STRIDE = 1.5  # largest step of a nuisance
 FAR = 5.0  # no nuisance further than this, in prior standard deviations
 SOAK = 0.5  # K, prior of the soak temperature
@@ -40,7 +41,8 @@ class Detectability:
 class Detector:
     """Distances of one case. Everything is measured from the *base*: the case's own unit and faults without any effect.
 
-    A nuisance is counted in units of its prior's standard deviation.
+    A nuisance is counted in units of its prior's standard deviation. Where another simulator made the truth, ``plain``
+    is the base by that one: what the two simulators differ by is no trace of an effect.
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class Detector:
         actuator: ActuatorParameters,
         noise: SensorNoise,
         truth: Sequence[Mapping[str, np.ndarray]],
+        plain: Sequence[Mapping[str, np.ndarray]] | None = None,
     ):
         self.case, self.actuator = case, actuator
         self.unit = {k: dict(v) for k, v in case.tolerances.items()}
@@ -100,7 +103,8 @@ class Detector:
             self.base.append(base)
             blocks.append(block)
             repeats.append(shifts[0])
-            deltas.append(view.whiten(less(view.statistics(shown), base))[0])
+            without = base if plain is None else view.statistics(coarser(fine, plain[m])[1])
+            deltas.append(view.whiten(less(view.statistics(shown), without))[0])
         self.delta = np.concatenate(deltas)
         self.jacobian = np.concatenate(blocks)
         self.normal = cho_factor(np.eye(len(self.prior)) + self.jacobian.T @ self.jacobian)
@@ -241,7 +245,7 @@ class Detector:
     def _tolerance_cost(self, effect: str | None) -> float:
         """Squared distance at which the unit's tolerances alone explain a truth of calibration effects."""
         others = [e for e in self.case.effects if e != effect]
-        if not others or any(EFFECTS[e].kind != "calibration" for e in others):
+        if not others or self.case.forms or any(EFFECTS[e].kind != "calibration" for e in others):
             return np.inf
         return sum(self._own_cost(e) for e in others)
 
@@ -266,9 +270,13 @@ class Detector:
     def detectability(self) -> Detectability:
         """Distances that go into the key."""
         effects = [e for e in self.case.effects if e != "speed_quantisation"]
-        nominal = min(self.squared(self.delta), self._tolerance_cost(None)) + self.lattice
+        linear = self.squared(self.delta) + self.lattice
+        nominal = min(linear, self._tolerance_cost(None) + self.lattice)
         if 5.0 < nominal < PLAIN:
             nominal = self.distance_to(None, 3)
+            moved = cho_solve(self.normal, self.jacobian.T @ self.delta)
+            if np.max(np.abs(moved)) < LINEAR:  # a fit by derivatives that scatter stops on its way
+                nominal = min(nominal, linear)
         members = {e: LATTICE for e in self.case.effects if e not in effects}
         design = {e: self.columns(e, COORDINATES[e].point(self.case.effects[e])) for e in effects}
         for effect in effects:

@@ -141,7 +141,13 @@ class View:
         moving = still < 1e-9
         some = moving.astype(float)
         thirds = self.time_bin * 3 // TIME_BINS + 3 * forward
-        waves = [g(order * middle) * some for order in (72.0, 144.0, 24.0, 1.0) for g in (np.cos, np.sin)]
+        turn = np.exp(1j * middle)
+        turn_8 = _squared(turn, 3)
+        turn_24 = turn_8 * turn_8 * turn_8
+        turn_72 = turn_24 * turn_24 * turn_24
+        # orders 72, 144, 24 and 1
+        waves = [g * some for wave in (turn_72, turn_72 * turn_72, turn_24, turn) for g in (wave.real, wave.imag)]
+        electrical = np.exp(1j * self.actuator.pole_pairs * middle)
         in_time = Sums(some, self.time_bin, TIME_BINS)
         sums = {
             "bus": [Sums(np.ones_like(speed), self.time_bin, TIME_BINS)],
@@ -155,8 +161,10 @@ class View:
             cell = np.minimum((x / (2.0 * np.pi) * ANGLE_BINS).astype(int), ANGLE_BINS - 1)
             cell += ANGLE_BINS * forward + 2 * ANGLE_BINS * fast
             f = trapezoid(x)
-            swing = [f * speed * np.cos(middle) * some, f * speed * np.sin(middle) * some]
-            orders = [np.ones_like(x), *(g(n * x) for n in (1, 2, 5, 7) for g in (np.cos, np.sin))]
+            swing = [f * speed * turn.real * some, f * speed * turn.imag * some]
+            wave = electrical * np.exp(-1j * ALPHA[j])
+            wave_2, wave_5 = wave * wave, wave * _squared(wave, 2)
+            orders = [np.ones_like(x), *(g for w in (wave, wave_2, wave_5, wave_5 * wave_2) for g in (w.real, w.imag))]
             both = np.array([o * some * way for way in (forward, ~forward) for o in orders])
             sums[f"current_{j}"] = [Sums(both)]
             sign = np.sign(np.where(np.abs(f) > 0.9, f * speed, 0.0)) * some
@@ -253,6 +261,13 @@ class View:
         for kind, factor in self.factors.items():
             parts.append(solve_triangular(factor, statistics[kind].T, lower=True, check_finite=False).T)
         return np.concatenate(parts, axis=1)
+
+
+def _squared(x: np.ndarray, times: int) -> np.ndarray:
+    """x squared again and again."""
+    for _ in range(times):
+        x = x * x
+    return x
 
 
 def less(statistics: Mapping[str, np.ndarray], base: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
