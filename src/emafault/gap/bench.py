@@ -29,9 +29,7 @@ CLIPPED_LEAST = 20
 CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
 LOST = 2 * np.pi / 3  # from here on a sample cannot be told its sector
-DRIFT = (
-    3.0  # rad/s, below which a constant speed beside the angle's rate is no mistaken sensor: coarse truncation has it
-)
+DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
 SAME_CONDITION = 2.0  # K
 TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
