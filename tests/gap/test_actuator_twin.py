@@ -13,7 +13,7 @@ from emafault.config import compose, reference_actuator
 from emafault.gap.inference import Problem
 from emafault.gap.which import search
 from emafault.recording import Recording
-from emafault.twins.actuator import ActuatorTwin
+from emafault.twins.actuator import ActuatorTwin, rounding_of
 from emafault.twins.actuator_noise import channel_spread
 from emafault.twins.actuator_statistics import COMMUTATIONS, SIZE, SPECIFICATION, Nominal, _shared, compute
 
@@ -53,6 +53,17 @@ def test_statistics_are_as_many_as_specified_and_vanish_without_gap_or_noise():
     assert len(SPECIFICATION) == SIZE == len(found.values)
     plateau = [m for m, s in enumerate(SPECIFICATION) if s[0].startswith("plateau")]
     assert np.abs(found.values[plateau]).max() < 0.01  # V; the noise of one of them is about 0.05 V
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("way", [np.round, np.floor, np.trunc])
+def test_how_a_speed_was_rounded_is_told(way, sign):
+    time = 2e-4 * np.arange(2000)
+    angle = sign * 60.0 * time**2 + 1e-4 * np.random.default_rng(3).standard_normal(2000)
+    speed = 3.0 * way(sign * 120.0 * time / 3.0)
+    found = rounding_of(speed, angle, 2e-4, 3.0)
+    values = sign * np.array([0.3, 1.6, 2.7])
+    np.testing.assert_array_equal(found(values), way(values))
 
 
 @pytest.mark.parametrize("inside", [-0.3, -0.11, -0.02, 0.0, 0.05, 0.19, 0.4])

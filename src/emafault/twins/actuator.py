@@ -1,6 +1,6 @@
 """The reference actuator as the diagnosis sees it: statistics by simulation with the actuator's own compiled model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -34,6 +34,7 @@ from .actuator_statistics import (
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_PAIRS = 4  # of noise and its negative, over which its bias of the statistics is averaged
 ROUNDED_ALIKE = 20  # samples
+ROUNDED_SURELY = 0.15  # steps, within which the mean error of a speed tells how it was rounded
 JITTER_REPEATS = 8
 RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
@@ -60,6 +61,26 @@ ALIKE = (
 )
 
 
+def rounding_of(
+    speed: np.ndarray, angle: np.ndarray, interval: float, step: float
+) -> Callable[[np.ndarray], np.ndarray]:
+    """How a speed (time,) recorded in steps was rounded: to the nearest, down, or towards zero.
+
+    Told by its mean error against the angle's rate (rad/s) in either direction, in steps.
+    """
+    if step <= 0.0:
+        return np.round
+    rate = np.diff(angle) / interval
+    error = (speed[1:] - rate) / step
+    ways = [error[way > step] for way in (rate, -rate)]
+    means = [float(np.mean(e)) for e in ways if len(e) >= MINIMUM_COUNT]
+    for rounding, expected in ((np.floor, (-0.5, -0.5)), (np.trunc, (-0.5, 0.5))):
+        wanted = [x for x, e in zip(expected, ways, strict=True) if len(e) >= MINIMUM_COUNT]
+        if means and np.max(np.abs(np.subtract(means, wanted))) < ROUNDED_SURELY:
+            return rounding
+    return np.round
+
+
 @dataclass
 class _Brought:
     """One recording as brought, with what depends on it alone."""
@@ -73,6 +94,7 @@ class _Brought:
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]  # of the bench, by channel
     theta_0: float
+    rounding: Callable[[np.ndarray], np.ndarray]  # of a speed that is recorded in steps
     moment: float | None = None  # at which a step of the command came, from the sample before it to that after
     variances: dict[str, float] = field(default_factory=dict)  # of this recording's channels, as last compared
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
@@ -122,9 +144,10 @@ class ActuatorTwin:
         names = ["phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle"]
         names += ["output_position", "commanded_position", "bus_voltage"]
         signals = {n: np.ascontiguousarray(getattr(recording, n)) for n in names if getattr(recording, n) is not None}
-        rest = np.flatnonzero(np.abs(signals["rotor_angle"] - signals["rotor_angle"][0]) > 2e-3)
-        still = max(1, int(rest[0]) if len(rest) else len(signals["rotor_angle"]))
-        theta_0 = float(np.mean(signals["rotor_angle"][: max(1, still - 1)]))
+        theta = signals["rotor_angle"]
+        rest = np.flatnonzero(np.abs(theta - theta[0]) > 2e-3)
+        still = max(1, int(rest[0]) if len(rest) else len(theta))
+        theta_0 = float(np.mean(theta[: max(1, still - 1)]))
         nominal = Nominal.of(self.actuator, recording, theta_0)
         jumps = jumps_of(recording.commanded_position)
         command = self._command(recording, jumps)
@@ -132,7 +155,8 @@ class ActuatorTwin:
         usable = computed.count >= MINIMUM_COUNT
         if not nominal.has_end:
             usable[RIPPLED] = False
-        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
+        rounding = rounding_of(signals["rotor_speed"], theta, nominal.interval, float(computed.values[LATTICE]))
+        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0, rounding)
         if not nominal.has_end:
             brought.repeats = RIPPLE_REPEATS
         return brought
@@ -255,7 +279,7 @@ class ActuatorTwin:
             sigma = self._brought[name].noise.get("speed", 0.0)
             rng = np.random.default_rng(np.frombuffer(run.tobytes(), np.uint32))
             noisy = signals["rotor_speed"] + sigma * rng.standard_normal(len(signals["rotor_speed"]))
-            signals["rotor_speed"] = step * np.round(noisy / step)
+            signals["rotor_speed"] = step * self._brought[name].rounding(noisy / step)
         return self._compared(name, signals)
 
     def _compared(self, name: str, signals: dict) -> np.ndarray:
