@@ -349,6 +349,20 @@ def test_an_effect_that_ends_off_is_no_candidate_and_the_null_has_what_it_found(
     assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates == []
 
 
+def test_an_effect_that_goes_off_in_the_very_last_fit_is_no_candidate_either(monkeypatch):
+    def off_at_last(problem, null, candidates, by_id, averaged=None):
+        if averaged is None:
+            return null, candidates
+        points = [replace(c.point, values=np.array([*c.point.values[:2], 0.0, 0.0])) for c in candidates]
+        return null, [replace(c, point=p) for c, p in zip(candidates, points, strict=True)]
+
+    twin = Lines(17, curvature=1.0)
+    twin.parameters = [replace(p, amplitude=p.effect is not None) for p in twin.parameters]
+    assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates
+    monkeypatch.setattr("emafault.gap.which._null_again", off_at_last)
+    assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates == []
+
+
 class Scattering(Lines):
     """Every prediction but that of the null scatters by itself, as a switched simulation does."""
 

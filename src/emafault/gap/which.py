@@ -207,11 +207,17 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > HOPELESS:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
-        candidates = [c for c in candidates if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
+        candidates = _of_size(problem, candidates, by_id)
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
+        candidates = _of_size(problem, candidates, by_id)
     return null, candidates
+
+
+def _of_size(problem: Problem, candidates: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
+    """The candidates none of whose members is negligible."""
+    return [c for c in candidates if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
 
 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
