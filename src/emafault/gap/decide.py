@@ -22,7 +22,7 @@ from .which import Search, far_outside, groups, left_where_acting
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration, and what machines without blind cases of their own are judged by
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
-MOST = 0.5  # share that a named set may leave, where it acts and of the gap on the confirm recordings
+MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more
 WITHDRAWN = 0.2  # the most that is believed of a set that leaves more
 
@@ -160,7 +160,7 @@ def decide(
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
     odds = float(np.dot(calibration.right, evidence.right_features()))
     p_right = calibration.most * _sigmoid(odds)
-    if evidence.acting > MOST or (left is not None and left > MOST):
+    if max(evidence.unexplained, evidence.acting, left or 0.0) > MOST:
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()
