@@ -23,6 +23,7 @@ COMPARED = 4  # candidates that are compared without it
 SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
 OFF = 1e-6  # of the range of an amplitude, within which it is zero
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
+LUCK = 6.0  # of the gain of a fit on single predictions, by which it may be off where they scatter
 
 
 @dataclass(frozen=True)
@@ -202,10 +203,11 @@ def _concluded(
 ) -> tuple[Point, list[Candidate]]:
     """The leading candidates fitted to the end and compared without luck, and the null given the same chances."""
     null, candidates = _null_again(problem, null, candidates, by_id)
-    if candidates and candidates[0].gain > HOPELESS:
+    least = -LUCK if problem.scatters else HOPELESS
+    if candidates and candidates[0].gain > least:
         candidates = _fitted_alike(problem, null, candidates, by_id, addition)
         null, candidates = _null_again(problem, null, candidates, by_id)
-    if candidates and candidates[0].gain > HOPELESS:
+    if candidates and candidates[0].gain > least:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
         candidates = _of_size(problem, candidates, by_id)
     if candidates:
