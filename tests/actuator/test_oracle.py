@@ -94,6 +94,19 @@ def test_a_finer_step_changes_nothing():
         assert np.sqrt(np.mean((coarse[name] - fine[name]) ** 2)) < 3e-3 * np.sqrt(np.mean(fine[name] ** 2))
 
 
+def test_events_at_the_steps_only_overshoot_less_the_finer_the_step():
+    runs = make_runs(reference_actuator(), np.array([FAULT]))
+
+    def band(**how):
+        """Spread of the current at the recording instants about its mean of the interval: the ripple."""
+        s = simulate_fixed_step(runs, PARABOLIC, 0.15, 2e-4, **how)
+        return float(np.std(s["phase_current_end"] - s["phase_current"]))
+
+    exact = band()
+    coarse, fine = (band(step=step, sampled=True) - exact for step in (4e-6, 4e-7))
+    assert coarse > 0.02 * exact and abs(fine) < 0.3 * coarse
+
+
 @pytest.mark.parametrize("fault", [[0.0] * 6, FAULT])
 @pytest.mark.parametrize("command", [PARABOLIC, REVERSAL])
 def test_nominal(fault, command):

@@ -41,6 +41,7 @@ def simulate_fixed_step(
     interval: float,
     step: float = 1e-6,
     forms: Collection[str] = (),
+    sampled: bool = False,
 ) -> dict[str, np.ndarray]:
     """Simulate runs on a fixed step and return the clean recorded signals.
 
@@ -51,6 +52,8 @@ def simulate_fixed_step(
     duration, interval, step : s
     forms : ids of effects that take their alternative form. ``speed_quantisation`` has none here, because rounding
         belongs to the sensors (see ``quantise_by_truncation``).
+    sampled : comparator and commutation act at the end of the step in which they are due, as in a plain simulator,
+        and not within it
 
     Returns
     -------
@@ -79,7 +82,7 @@ def simulate_fixed_step(
         table = _back_emf_table(record) if flags[F_SHAPE] else np.zeros(TABLE)
         out_phased = np.zeros((3, samples, 3))
         out_scalar = np.zeros((5, samples))
-        _run(record, ticks, samples, interval, step, flags, table, out_phased, out_scalar)
+        _run(record, ticks, samples, interval, step, flags, sampled, table, out_phased, out_scalar)
         for j, name in enumerate(SIGNALS):
             phased[name][r] = out_phased[j]
         for j, name in enumerate(SCALARS):
@@ -192,7 +195,7 @@ def _sense(i, gain, offset, curved):
 
 
 @compiled
-def _run(record, command, samples, interval, step, forms, table, phased, scalar):
+def _run(record, command, samples, interval, step, forms, sampled, table, phased, scalar):
     p, J0, ratio = record.pole_pairs, record.inertia, record.gear_ratio
     Tc, Vf, h = record.control_period, record.diode_voltage, record.hysteresis
     ambient = record.dT
@@ -326,7 +329,7 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
             turn = p * dt * w_mid
             next_plus, next_minus = _active_pair(seen + turn, edges)
             until_edge = 2.0 * dt
-            if next_plus != plus or next_minus != minus:
+            if not sampled and (next_plus != plus or next_minus != minus):
                 low, high = 0.0, 1.0
                 for _ in range(30):
                     half = 0.5 * (low + high)
@@ -400,7 +403,7 @@ def _run(record, command, samples, interval, step, forms, table, phased, scalar)
                     - limit
                 )
                 before = side * (pair - limit)
-                if beyond > 0.0 and before < 0.0:
+                if beyond > 0.0 and before < 0.0 and not sampled:
                     low, high, g_low, g_high = 0.0, tau, before, beyond
                     for _ in range(30):
                         tau = low + (high - low) * g_low / (g_low - g_high)

@@ -56,17 +56,20 @@ def make_cases(
     return names
 
 
-def simulate_truth(case: Case, actuator: ActuatorParameters, step: float | None = None) -> list[dict[str, np.ndarray]]:
+def simulate_truth(
+    case: Case, actuator: ActuatorParameters, step: float | None = None, sampled: bool = False
+) -> list[dict[str, np.ndarray]]:
     """Noise-free signals of each recording; a case with other forms runs on the other integrator.
 
-    ``step`` (s) lets every case run on it.
+    ``step`` (s) lets every case run on it, ``sampled`` with events at the steps only (see ``simulate_fixed_step``).
     """
     out = []
     for plan in case.recordings:
         runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
         command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
         if case.forms or step is not None:
-            signals = simulate_fixed_step(runs, command, plan.duration, plan.interval, step or STEP, case.forms)
+            timing = plan.duration, plan.interval, step or STEP
+            signals = simulate_fixed_step(runs, command, *timing, case.forms, sampled)
         else:
             signals = simulate(runs, command, plan.duration, plan.interval)
         out.append(signals)
@@ -74,10 +77,15 @@ def simulate_truth(case: Case, actuator: ActuatorParameters, step: float | None 
 
 
 def write_bench(
-    case: Case, folder: Path, actuator: ActuatorParameters, noise: SensorNoise, step: float | None = None
+    case: Case,
+    folder: Path,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    step: float | None = None,
+    sampled: bool = False,
 ) -> list[dict[str, np.ndarray]]:
-    """Write a case's recordings and return their noise-free signals; ``step`` as in ``simulate_truth``."""
-    truth = simulate_truth(case, actuator, step)
+    """Write a case's recordings and return their noise-free signals; the last two as in ``simulate_truth``."""
+    truth = simulate_truth(case, actuator, step, sampled)
     scaled = SensorNoise(**{k: v * case.noise_scale.get(k, 1.0) for k, v in asdict(noise).items()})
     for n, (plan, signals) in enumerate(zip(case.recordings, truth)):
         runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
