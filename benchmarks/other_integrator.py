@@ -49,9 +49,9 @@ def main() -> None:
     for row in rows:
         if not row["right"]:
             print(row["name"], "+".join(row["truth"]), "was called", "+".join(row["named"]) or row["answer"])
-    print(
-        f"{sum(r['right'] for r in rows)} of {len(rows)} right on {options.rung} at {options.step:g} s{', sampled' * options.sampled}"
-    )
+    events = ", events at the steps only" if options.sampled else ""
+    right = sum(r["right"] for r in rows)
+    print(f"{right} of {len(rows)} right on {options.rung} at {options.step:g} s{events}")
 
 
 if __name__ == "__main__":
