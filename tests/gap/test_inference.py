@@ -168,6 +168,16 @@ def test_a_cause_beside_a_large_remainder_is_named_and_a_stand_in_is_not():
     assert decide(problem, found, twin.hypotheses, Calibration.load(UNCALIBRATED)).verdict == "unknown"
 
 
+def test_a_set_without_evidence_over_the_empty_one_is_not_believed():
+    twin = Lines(3, curvature=1.0)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    certain = replace(Calibration.load(UNCALIBRATED), right=(9.0, 0.0, 0.0, 0.0, 0.0), gap=(9.0, 0.0, 0.0))
+    assert decide(problem, found, twin.hypotheses, certain).verdict == "explained"
+    idle = replace(found, candidates=[replace(c, gain=-1.0) for c in found.candidates])
+    assert decide(problem, idle, twin.hypotheses, certain).verdict == "unknown"
+
+
 def test_a_step_that_promises_nothing_is_not_taken():
     twin = Lines(5, curvature=0.5)
     problem = Problem(twin, ["one", "two"])

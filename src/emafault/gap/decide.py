@@ -24,7 +24,7 @@ DEFAULT = Path(__file__).with_name("calibration.json")
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
 MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more
-WITHDRAWN = 0.2  # the most that is believed of a set that leaves more
+WITHDRAWN = 0.2  # the most that is believed of a set that leaves more, or has no evidence over the empty one
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def decide(
         return Decision("unknown" if unknown > 0.5 else "no_gap", [], 1.0 - p_gap, unknown, [], evidence)
     odds = float(np.dot(calibration.right, evidence.right_features()))
     p_right = calibration.most * _sigmoid(odds)
-    if max(evidence.unexplained, evidence.acting, left or 0.0) > MOST:
+    if evidence.gain <= 0.0 or max(evidence.unexplained, evidence.acting, left or 0.0) > MOST:
         p_right = min(p_right, WITHDRAWN)
     weights = np.array([np.exp(min(0.0, c.gain - group[0].gain)) for c in group])
     weights /= weights.sum()
