@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from emafault.actuator.commands import command_positions, jumps_of
+from emafault.actuator.conduction import NEVER, passing
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
 from emafault.config import reference_actuator
@@ -194,3 +195,19 @@ def test_a_recorded_step_is_found_however_it_is_sampled(interval, moment):
         ("parabolic", {"acceleration": 0.7}),
     ):
         assert len(jumps_of(recorded(name, **settings))) == 0
+
+
+def test_a_commutation_is_never_missed():
+    """A light rotor: where a comparator's event comes just before an edge, rounding may put the rotor past it."""
+    for start in np.arange(0.0, 2.0, 0.1):
+        runs = make_runs(ACTUATOR, HEALTHY, theta_0=start, effects={"inertia": {"scale": 0.01}})
+        signals = simulate(runs, command("ramp", 0.5, speed=0.4), 0.5, 5e-4)
+        assert np.max(np.abs(signals["phase_voltage"])) < 49.0, start
+
+
+def test_a_bound_is_passed_at_once_where_rounding_has_put_the_motion_past_it():
+    assert passing(-1e-9, -1, -160.0, 0.0, 0.0, 1e-5) == 0.0
+    assert passing(0.0, 1, 160.0, 0.0, 0.0, 1e-5) == 0.0
+    assert passing(1e-9, 1, -160.0, 0.0, 0.0, 1e-5) == pytest.approx(1e-9 / 160.0)  # on its way back
+    assert passing(-1e-4, 1, 160.0, 0.0, 0.0, 1e-5) == pytest.approx(1e-4 / 160.0)
+    assert passing(-1e-2, 1, 160.0, 0.0, 0.0, 1e-5) == NEVER

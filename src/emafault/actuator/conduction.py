@@ -42,6 +42,16 @@ def crossing(c0, c1, c2, c3, c4, h):
 
 
 @compiled
+def passing(beyond, direction, c1, c2, c3, h):
+    """Time in [0, h] at which a motion in ``direction`` (+1, -1) passes a bound, ``beyond`` + c1 t + c2 t^2 + c3 t^3
+    being how far it is past it; at once where rounding has put it there before its event.
+    """
+    if beyond * direction >= 0.0 and c1 * direction > 0.0:
+        return 0.0
+    return crossing(beyond, c1, c2, c3, 0.0, h)
+
+
+@compiled
 def conduct_pair(
     i, w, high, duration, centre, band, V, R, inverse_L, saturation, back_emf, load, viscous, inverse_inertia, moving,
     limit_forward, limit_backward, lower, upper,

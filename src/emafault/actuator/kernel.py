@@ -10,7 +10,7 @@ integrals of the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be st
 import numpy as np
 
 from .compiled import compiled
-from .conduction import CURRENT_TOLERANCE, LARGEST_CHANGE, MAX_SEGMENT, NEVER, conduct_pair, crossing
+from .conduction import CURRENT_TOLERANCE, LARGEST_CHANGE, MAX_SEGMENT, NEVER, conduct_pair, crossing, passing
 from .friction import coulomb_torque, sliding_torque, static_limit
 from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 
@@ -436,9 +436,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
                 ahead = (edge[cell + 1] if cell + 1 < cells else edge[0] + TWO_PI) - edge[cell]
             else:
                 ahead = 0.0
-            te = crossing(into - ahead, poles * w, 0.5 * poles * a, poles * b / 6.0, 0.0, h)
-            if into == ahead and moving * w > 0.0:
-                te = 0.0
+            te = passing(into - ahead, moving, poles * w, 0.5 * poles * a, poles * b / 6.0, h)
             if te < h:
                 h, event = te, 3
             te = crossing(w, a, 0.5 * b, c / 6.0, 0.0, h)
@@ -447,7 +445,7 @@ def run_actuator(p, command, interval, voltage, current, current_end, speed, ang
             if not compliant:
                 reach = (theta - p.theta_0) / ratio - moving * half_play
                 if abs(reach) > 0.9 * p.end_stop and reach * moving > 0.0:
-                    te = crossing(reach - moving * p.end_stop, w / ratio, 0.5 * a / ratio, b / ratio / 6.0, 0.0, h)
+                    te = passing(reach - moving * p.end_stop, moving, w / ratio, 0.5 * a / ratio, b / ratio / 6.0, h)
                     if te < h:
                         h, event = te, 5
         else:
