@@ -14,8 +14,9 @@ from emafault.gap.inference import Problem
 from emafault.gap.which import search
 from emafault.recording import Recording
 from emafault.twins.actuator import ActuatorTwin, rounding_of
+from emafault.twins.actuator_layout import COMMUTATIONS, SIZE, SPECIFICATION
 from emafault.twins.actuator_noise import channel_spread
-from emafault.twins.actuator_statistics import COMMUTATIONS, SIZE, SPECIFICATION, Nominal, _shared, compute
+from emafault.twins.actuator_statistics import Nominal, _shared, compute
 
 ACTUATOR = reference_actuator()
 NOISE = SensorNoise(**compose()["sensors"])

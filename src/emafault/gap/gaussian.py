@@ -134,9 +134,8 @@ class Gaussian:
     ) -> np.ndarray:
         """(statistic, free) forward differences; parameters of disjoint recordings are moved together.
 
-        A twin may know some derivatives exactly from others: ``derived`` names them and ``derive(name, values,
-        derivative,
-        recording)`` gives the rows of one recording from a function that returns those of another parameter. What
+        A twin may know some derivatives exactly from others: ``derived`` names them and
+        ``derive(name, values, derivative, recording)`` gives the rows of one recording from a function that returns those of another parameter. What
         cancels exactly in truth then cancels here too, where noisy differences would feign information. ``exact`` False
         leaves this out, for a few parameters that nothing else can cancel.
         """

@@ -102,7 +102,7 @@ def left_where_acting(problem: Problem, null: Point, fit: Point, widened: Sequen
         excess = max(float(np.square(left[kind]).sum()) - size - 2.0 * np.sqrt(2.0 * size), 0.0)
         total += power
         shared += power * excess / max(power + excess, 1e-12)
-    return shared / total if total > 0.0 else 1.0
+    return float(shared / total) if total > 0.0 else 1.0
 
 
 def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:

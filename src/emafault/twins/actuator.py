@@ -15,21 +15,10 @@ from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
 from ..gap.twin import Cell
 from ..recording import Recording
+from .actuator_layout import COMMUTATION_AT, LATTICE, PER_PHASE, SIZE, SPECIFICATION, SPEED_AT, SUM_I_AT, cells_of
 from .actuator_noise import CHANNELS, channel_spread, covariance_by_channel, noise_covariance
 from .actuator_parameters import derive, hypotheses_of, parameters_of, report
-from .actuator_statistics import (
-    _COMMUTATION,
-    _PER_PHASE,
-    _SPEED,
-    _SUM_I,
-    LATTICE,
-    SIZE,
-    SPECIFICATION,
-    Computed,
-    Nominal,
-    cells_of,
-    compute,
-)
+from .actuator_statistics import Computed, Nominal, compute
 
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_PAIRS = 4  # of noise and its negative, over which its bias of the statistics is averaged
@@ -54,10 +43,10 @@ BIAS_TRUST = 0.05  # relative error of the correction for noise inside the regre
 RIPPLED = [m for m, s in enumerate(SPECIFICATION) if s[0] in ("5th harmonic", "7th harmonic")]
 #: statistics of the three phases, (phase, statistic)
 ALIKE = (
-    np.arange(3 * _PER_PHASE).reshape(3, -1),
-    np.arange(_SUM_I + 1, _SUM_I + 4).reshape(3, 1),
-    np.arange(_SUM_I + 4, _SUM_I + 7).reshape(3, 1),
-    np.arange(_COMMUTATION, SIZE).reshape(3, -1),
+    np.arange(3 * PER_PHASE).reshape(3, -1),
+    np.arange(SUM_I_AT + 1, SUM_I_AT + 4).reshape(3, 1),
+    np.arange(SUM_I_AT + 4, SUM_I_AT + 7).reshape(3, 1),
+    np.arange(COMMUTATION_AT, SIZE).reshape(3, -1),
 )
 
 
@@ -408,13 +397,13 @@ class ActuatorTwin:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
             # the recording scatters once and the simulations it is compared with once more
-            aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[_COMMUTATION:])
+            aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[COMMUTATION_AT:])
             cov += (1.0 + 1.0 / b.repeats) * jitter
             extra = (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
-            extra[_COMMUTATION:] += aligned
+            extra[COMMUTATION_AT:] += aligned
             # a speed that changes slowly is rounded the same way for many samples on end
             step = float(run["speed_quantisation_step"])
-            extra[_SPEED:LATTICE] += ROUNDED_ALIKE * step**2 / 12.0
+            extra[SPEED_AT:LATTICE] += ROUNDED_ALIKE * step**2 / 12.0
             cov[np.diag_indices(SIZE)] += extra + 1e-18
             return cov[np.ix_(b.usable, b.usable)]
 

@@ -7,24 +7,21 @@ recorded value in every statistic is known, and the covariance follows from the 
 import numpy as np
 
 from ..actuator.motor import AXIS, TWO_PI
-from .actuator_statistics import (
-    _BUS,
-    _COMMUTATION,
-    _CONTROL,
-    _PER_PHASE,
-    _POSITION,
-    _SPEED,
-    _SUM_I,
-    _SUM_V,
-    _TORQUE,
+from .actuator_layout import (
+    BUS_AT,
+    COMMUTATION_AT,
+    CONTROL_AT,
     LATTICE,
-    ORDER_HALF,
     OSCILLATION,
-    REST_SPEED,
+    PER_PHASE,
+    POSITION_AT,
     SIZE,
-    Computed,
-    Nominal,
+    SPEED_AT,
+    SUM_I_AT,
+    SUM_V_AT,
+    TORQUE_AT,
 )
+from .actuator_statistics import ORDER_HALF, REST_SPEED, Computed, Nominal
 
 #: channel -> recorded signal
 CHANNELS = {
@@ -157,21 +154,21 @@ def covariance_by_channel(nominal: Nominal, signals: dict, computed: Computed) -
             out[:, :-1] -= weights[:, 1:] / (2 * dt)
         return out
 
-    sums_i = np.arange(_SUM_I, _SUM_V)
-    sums_v = np.arange(_SUM_V, _SPEED)
-    speeds = np.arange(_SPEED, LATTICE)
-    torque = np.arange(_TORQUE, _POSITION)
-    shares = np.arange(_COMMUTATION, SIZE)
+    sums_i = np.arange(SUM_I_AT, SUM_V_AT)
+    sums_v = np.arange(SUM_V_AT, SPEED_AT)
+    speeds = np.arange(SPEED_AT, LATTICE)
+    torque = np.arange(TORQUE_AT, POSITION_AT)
+    shares = np.arange(COMMUTATION_AT, SIZE)
     plus = np.argmax(f, axis=1)
     minus = np.argmin(f, axis=1)
     i = signals["phase_current"]
     pair = 0.5 * (i[np.arange(n), plus] - i[np.arange(n), minus])
     per_pair = np.where(np.abs(pair) > 0.2, 1.0 / np.where(np.abs(pair) > 0.2, pair, 1.0), 0.0)
     for j in range(3):
-        own = np.arange(j * _PER_PHASE, (j + 1) * _PER_PHASE)
+        own = np.arange(j * PER_PHASE, (j + 1) * PER_PHASE)
         electrical = np.concatenate([own, sums_v])
         add(electrical, phi[electrical], "voltage")
-        floating_only = np.array([m for m in sums_i if m < _SUM_I + 4 or m == _SUM_I + 4 + j])
+        floating_only = np.array([m for m in sums_i if m < SUM_I_AT + 4 or m == SUM_I_AT + 4 + j])
         share = shares[4 * j : 4 * j + 4]
         rows = np.concatenate([electrical, floating_only, torque, share])
         weights = np.concatenate(
@@ -182,22 +179,22 @@ def covariance_by_channel(nominal: Nominal, signals: dict, computed: Computed) -
         add(rows, weights, "current")
         if nominal.has_end:
             add(electrical, ends(-L * phi[electrical]), "current_end")
-    control = np.arange(_CONTROL, _COMMUTATION)
+    control = np.arange(CONTROL_AT, COMMUTATION_AT)
     lag = int(max(1.0, round(0.01 / dt)))
     demand = np.zeros((len(control), n))
     demand[:, :-1] -= K_p * phi[control][:, 1:]
     demand[:, : n - lag - 1] += K_p * phi[control][:, lag + 1 :]
     add(np.concatenate([speeds, control]), np.concatenate([phi[speeds], -demand]), "speed")
-    position = np.arange(_POSITION, OSCILLATION)
+    position = np.arange(POSITION_AT, OSCILLATION)
     add(
         np.concatenate([position, control]),
         np.concatenate([phi[position], -ratio * K_pos * demand]),
         "position",
     )
     # the angle enters through speed and acceleration
-    rows = np.concatenate([np.arange(3 * _PER_PHASE), sums_v, torque])
+    rows = np.concatenate([np.arange(3 * PER_PHASE), sums_v, torque])
     on_speed = np.concatenate(
-        [-k * f[:, j] * phi[j * _PER_PHASE : (j + 1) * _PER_PHASE] for j in range(3)]
+        [-k * f[:, j] * phi[j * PER_PHASE : (j + 1) * PER_PHASE] for j in range(3)]
         + [-k * f.sum(1) * phi[sums_v], -B * phi[torque]]
     )
     weights = _speed_transpose(on_speed, dt)
@@ -208,7 +205,7 @@ def covariance_by_channel(nominal: Nominal, signals: dict, computed: Computed) -
     rows = np.concatenate([rows, speeds, position])
     add(rows, np.concatenate([weights, step, -phi[position] / ratio]), "angle")
     if nominal.has_bus:
-        buses = np.arange(_BUS, _BUS + 3)
+        buses = np.arange(BUS_AT, BUS_AT + 3)
         add(buses, phi[buses], "bus_voltage")
     by_channel["position"][OSCILLATION, OSCILLATION] = 1.0 / n
     return by_channel

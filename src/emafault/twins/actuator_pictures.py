@@ -7,7 +7,8 @@ import numpy as np
 from ..actuator.motor import AXIS, TWO_PI
 from ..gap.diagnose import Diagnosis
 from .actuator import ActuatorTwin
-from .actuator_statistics import EQUATIONS, PHASE_EQUATIONS, cells_of, compute
+from .actuator_layout import EQUATIONS, PHASE_EQUATIONS, cells_of
+from .actuator_statistics import compute
 
 BINS = 40
 _RESIDUAL = {

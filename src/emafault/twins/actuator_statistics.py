@@ -1,42 +1,47 @@
 """Statistics of a recording of the actuator: its signals put into the nominal model's equations.
 
 Every statistic is a matched filter ``sum phi r / sqrt(sum phi^2)`` of one equation's residual r with one regressor
-phi, so
-that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The same
-code
-runs on measured and on simulated recordings. Residuals use the nominal parameters at the measured ambient temperature.
+phi, so that a term the model lacks shows in the statistics whose regressor looks like it, whatever the trajectory. The
+same code runs on measured and on simulated recordings. Residuals use the nominal parameters at the measured ambient
+temperature.
 
 A residual holds the noise of its own phase's di/dt, so what is regressed on di/dt takes the other two phases' instead
 (their sum is -di/dt) as an instrument z: ``sum z r / sqrt(sum z di/dt)``.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ..actuator.compiled import compiled
 from ..actuator.motor import AXIS, TWO_PI, trapezoid
 from ..actuator.parameters import ActuatorParameters
-from ..gap.twin import Cell
 from ..recording import Recording
-
-PHASE_EQUATIONS = ("electrical_a", "electrical_b", "electrical_c")
-#: rows of the residual array
-EQUATIONS = (
-    *PHASE_EQUATIONS,
-    "sensor_current",
-    "sensor_voltage",
-    "sensor_speed",
-    "torque",
-    "position",
-    "bus",
-    "control",
+from .actuator_layout import (
+    ANGLE_BINS,
+    BUS_AT,
+    COMMUTATION_AT,
+    CONTROL_AT,
+    EQUATIONS,
+    LATTICE,
+    ORDERS,
+    ORDERS_AT,
+    OSCILLATION,
+    PER_DIRECTION,
+    PER_PHASE,
+    POSITION_AT,
+    RIPPLE,
+    SIZE,
+    SPEED_AT,
+    SPEED_BINS,
+    SPEED_EDGES,
+    SUM_I_AT,
+    SUM_V_AT,
+    TORQUE_AT,
+    TORQUE_REST_AT,
 )
-SPEED_EDGES = (2.0, 8.0, 20.0, 50.0, 110.0, 1.0e9)  # rad/s
-ORDERS = (1, 2, 4, 8, 12, 24, 36, 72)  # of the mechanical turn; each the double or the sum of earlier ones
+
 _MADE_FROM = np.array([(-1, -1), (0, 0), (1, 1), (2, 2), (3, 2), (4, 4), (5, 4), (6, 6)])
-ANGLE_BINS = 12
 MARGIN = np.deg2rad(3.5)  # electrical, kept from the corners of the trapezoid
 WINDOW = np.deg2rad(12.0)  # electrical, before and after a commutation
 REST_SPEED = 2.0  # rad/s; below it dry friction has no known sign
@@ -45,111 +50,9 @@ REGULATOR_SMOOTHING = 5.0e-4  # s, half span over which the current's reference 
 ORDER_HALF = 3.0e-4  # s, half span over which speed is differenced from angle
 LOOK = 300  # values that are looked at first for whether the speed is rounded at all
 WEAKEST_INSTRUMENT = 0.05  # of an instrument's power that must be the current's own and not noise
-COMMUTATIONS = ("before_on", "after_on", "before_off", "after_off")
-
-
-def _specification() -> list[tuple[str, str, str, float, float]]:
-    """(label, equation, along, from, to) of every statistic, in the order in which they are filled."""
-    out: list[tuple[str, str, str, float, float]] = []
-    for equation in PHASE_EQUATIONS:
-        for label, along in (
-            ("plateau k", "rotor_speed"),
-            ("plateau R", "current"),
-            ("plateau constant", "direction"),
-            ("plateau L", "current"),
-            ("plateau i2 di", "current"),
-            ("plateau k cos", "rotor_angle"),
-            ("plateau k sin", "rotor_angle"),
-            ("plateau R t", "time"),
-            ("plateau k t", "time"),
-            ("plateau |i| i", "current"),
-            ("plateau sign", "direction"),
-            ("floating k", "rotor_speed"),
-            ("floating slope", "rotor_angle"),
-            ("floating constant", "direction"),
-            ("floating k cos", "rotor_angle"),
-            ("floating k sin", "rotor_angle"),
-            ("commutation L", "current"),
-            ("commutation R", "current"),
-            ("commutation k", "rotor_speed"),
-            ("5th harmonic", "order"),
-            ("7th harmonic", "order"),
-        ):
-            out.append((label, equation, along, 0.0, 0.0))
-        for b in range(ANGLE_BINS):
-            out.append(
-                (f"sector {30 * b}", equation, "rotor_angle", TWO_PI * b / ANGLE_BINS, TWO_PI * (b + 1) / ANGLE_BINS)
-            )
-    for label in ("constant", "i_a", "i_b", "i_c", "floating a", "floating b", "floating c"):
-        out.append((f"sum {label}", "sensor_current", "current", 0.0, 0.0))
-    for label, along in (("constant", "direction"), ("sum k", "rotor_speed")):
-        out.append((f"sum {label}", "sensor_voltage", along, 0.0, 0.0))
-    for label, along in (
-        ("constant", "direction"),
-        ("scale", "rotor_speed"),
-        ("acceleration", "time"),
-        ("sign", "direction"),
-        ("lattice", "rotor_speed"),
-    ):
-        out.append((f"speed {label}", "sensor_speed", along, 0.0, 0.0))
-    for direction, low, high in (("forward", 0.0, 1.0), ("backward", -1.0, 0.0)):
-        for label in ("constant", "speed", "acceleration"):
-            out.append((f"{direction} {label}", "torque", "direction", low, high))
-        for low, high in pairwise(SPEED_EDGES):
-            signed = (low, high) if direction == "forward" else (-high, -low)
-            out.append((f"{direction} speed bin", "torque", "rotor_speed", *signed))
-    for label, along in (("position", "rotor_angle"), ("drive", "current"), ("time", "time")):
-        out.append((label, "torque", along, 0.0, 0.0))
-    for order in ORDERS:
-        for part in ("cos", "sin"):
-            out.append((f"order {order} {part}", "torque", "order", float(order), float(order)))
-    for label, along in (
-        ("forward", "direction"),
-        ("backward", "direction"),
-        ("acceleration", "time"),
-        ("speed", "rotor_speed"),
-        ("torque", "current"),
-        ("oscillation", "order"),
-    ):
-        out.append((f"play {label}", "position", along, 0.0, 0.0))
-    for label, along in (("constant", "direction"), ("current", "current"), ("power", "rotor_speed")):
-        out.append((f"bus {label}", "bus", along, 0.0, 0.0))
-    for label in ("slope ahead", "slope", "slope before"):
-        out.append((f"regulator {label}", "control", "time", 0.0, 0.0))
-    for letter in "abc":
-        for label in COMMUTATIONS:
-            out.append((f"{letter} {label}", "control", "rotor_angle", 0.0, 0.0))
-    return out
-
-
-SPECIFICATION = _specification()
-SIZE = len(SPECIFICATION)
-#: first statistic of each group
-_PER_PHASE = 21 + ANGLE_BINS
-_SUM_I = 3 * _PER_PHASE
-_SUM_V = _SUM_I + 7
-_SPEED = _SUM_V + 2
-_TORQUE = _SPEED + 5
-_PER_DIRECTION = 3 + len(SPEED_EDGES) - 1
-_TORQUE_REST = _TORQUE + 2 * _PER_DIRECTION
-_ORDERS = _TORQUE_REST + 3
-_POSITION = _ORDERS + 2 * len(ORDERS)
-_BUS = _POSITION + 6
-_CONTROL = _BUS + 3
-_COMMUTATION = _CONTROL + 3
-LATTICE = _SPEED + 4
-OSCILLATION = _POSITION + 5
-#: statistics of di/dt; how much of it the samples show depends on where they fall on the switching ripple
-RIPPLE = np.array([j * _PER_PHASE + m for j in range(3) for m in (3, 4, 16)])
-SPEED_BINS = np.array([_TORQUE + d * _PER_DIRECTION + 3 + b for d in (0, 1) for b in range(len(SPEED_EDGES) - 1)])
 _SPEEDS = np.array(SPEED_EDGES)
 _ORDER_LIST = np.array(ORDERS, float)
 _COS_AXIS, _SIN_AXIS = np.cos(AXIS), np.sin(AXIS)
-
-
-def cells_of(recording: str) -> list[Cell]:
-    """One cell per statistic of one recording."""
-    return [Cell(recording, equation, along, low, high, label) for label, equation, along, low, high in SPECIFICATION]
 
 
 @dataclass(frozen=True)
@@ -358,11 +261,11 @@ def fill_statistics(
             r = V[n, j] - R * i[n, j] - L * di - k * f[j] * w
             residual[j, n] = r
             sum_r += V[n, j] - k * f[j] * w - L * di - R * i[n, j]
-            base = j * _PER_PHASE
+            base = j * PER_PHASE
             if not in_motion:
                 # where exactly the rotor comes to rest is chance, and may be at the very edge of a commutation
                 if floating[j] > 0.0:
-                    _put(_SUM_I + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+                    _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
                 continue
             if plateau[j] > 0.0:
                 s = sign[j]
@@ -386,7 +289,7 @@ def fill_statistics(
                 _put(base + 13, n, 1.0, r, y, norm, count, store)
                 _put(base + 14, n, f[j] * w * cos_1, r, y, norm, count, store)
                 _put(base + 15, n, f[j] * w * sin_1, r, y, norm, count, store)
-                _put(_SUM_I + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+                _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
             else:
                 _put_instrument(base + 16, n, others, di, r, y, norm, power, count, store)
                 _put(base + 17, n, i[n, j], r, y, norm, count, store)
@@ -402,57 +305,57 @@ def fill_statistics(
                 _put(base + 21 + min(ANGLE_BINS - 1, int(x[j] / TWO_PI * ANGLE_BINS)), n, w, r, y, norm, count, store)
         # ---- sums over the phases
         residual[3, n] = sum_i
-        _put(_SUM_I, n, 1.0, sum_i, y, norm, count, store)
+        _put(SUM_I_AT, n, 1.0, sum_i, y, norm, count, store)
         for j in range(3):
-            _put(_SUM_I + 1 + j, n, i[n, j], sum_i, y, norm, count, store)
+            _put(SUM_I_AT + 1 + j, n, i[n, j], sum_i, y, norm, count, store)
         residual[4, n] = sum_r
         if in_motion:
-            _put(_SUM_V, n, 1.0, sum_r, y, norm, count, store)
-            _put(_SUM_V + 1, n, sum_f * w, sum_r, y, norm, count, store)
+            _put(SUM_V_AT, n, 1.0, sum_r, y, norm, count, store)
+            _put(SUM_V_AT + 1, n, sum_f * w, sum_r, y, norm, count, store)
         # ---- speed sensor against the angle
         r = speed[n] - (theta[n] - theta[n - 1]) / dt
         residual[5, n] = r
-        _put(_SPEED, n, 1.0, r, y, norm, count, store)
-        _put(_SPEED + 1, n, w, r, y, norm, count, store)
-        _put(_SPEED + 2, n, a_slow, r, y, norm, count, store)
-        _put(_SPEED + 3, n, 1.0 if w > 0.0 else -1.0, r, y, norm, count, store)
+        _put(SPEED_AT, n, 1.0, r, y, norm, count, store)
+        _put(SPEED_AT + 1, n, w, r, y, norm, count, store)
+        _put(SPEED_AT + 2, n, a_slow, r, y, norm, count, store)
+        _put(SPEED_AT + 3, n, 1.0 if w > 0.0 else -1.0, r, y, norm, count, store)
         # ---- torque balance in motion
         if in_motion:
             d = 1.0 if w > 0.0 else -1.0
             r = drive - J * a - B * w - T_c * d
             residual[6, n] = r
-            base = _TORQUE if d > 0.0 else _TORQUE + _PER_DIRECTION
+            base = TORQUE_AT if d > 0.0 else TORQUE_AT + PER_DIRECTION
             _put(base, n, weight * d, r, y, norm, count, store)
             _put(base + 1, n, weight * w, r, y, norm, count, store)
             _put(base + 2, n, weight * a_slow, r, y, norm, count, store)
             for b in range(_SPEEDS.shape[0] - 1):
                 if _SPEEDS[b] <= abs(w) < _SPEEDS[b + 1]:
                     _put(base + 3 + b, n, weight * d, r, y, norm, count, store)
-            _put(_TORQUE_REST, n, weight * shaft[n], r, y, norm, count, store)
-            _put(_TORQUE_REST + 1, n, weight * drive, r, y, norm, count, store)
-            _put(_TORQUE_REST + 2, n, weight * d * t, r, y, norm, count, store)
+            _put(TORQUE_REST_AT, n, weight * shaft[n], r, y, norm, count, store)
+            _put(TORQUE_REST_AT + 1, n, weight * drive, r, y, norm, count, store)
+            _put(TORQUE_REST_AT + 2, n, weight * d * t, r, y, norm, count, store)
             for o in range(_ORDER_LIST.shape[0]):
                 reach = _ORDER_LIST[o] * abs(w) * dt
                 if reach < 2.0:
-                    _put(_ORDERS + 2 * o, n, weight * turn_cos[o], r, y, norm, count, store)
-                    _put(_ORDERS + 2 * o + 1, n, weight * turn_sin[o], r, y, norm, count, store)
+                    _put(ORDERS_AT + 2 * o, n, weight * turn_cos[o], r, y, norm, count, store)
+                    _put(ORDERS_AT + 2 * o + 1, n, weight * turn_sin[o], r, y, norm, count, store)
         # ---- play between the rotor and the user shaft
         r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
         residual[7, n] = r
         smooth_play += (r - smooth_play) * min(1.0, dt / 5.0e-3)
         play_power += (r - smooth_play) ** 2
         if in_motion:
-            _put(_POSITION + (0 if w > 0.0 else 1), n, weight, r, y, norm, count, store)
-        _put(_POSITION + 2, n, a_slow, r, y, norm, count, store)
-        _put(_POSITION + 3, n, w, r, y, norm, count, store)
-        _put(_POSITION + 4, n, drive, r, y, norm, count, store)
+            _put(POSITION_AT + (0 if w > 0.0 else 1), n, weight, r, y, norm, count, store)
+        _put(POSITION_AT + 2, n, a_slow, r, y, norm, count, store)
+        _put(POSITION_AT + 3, n, w, r, y, norm, count, store)
+        _put(POSITION_AT + 4, n, drive, r, y, norm, count, store)
         # ---- bus
         if has_bus:
             r = bus[n] - Vdc
             residual[8, n] = r
-            _put(_BUS, n, 1.0, r, y, norm, count, store)
-            _put(_BUS + 1, n, level, r, y, norm, count, store)
-            _put(_BUS + 2, n, drive * w, r, y, norm, count, store)
+            _put(BUS_AT, n, 1.0, r, y, norm, count, store)
+            _put(BUS_AT + 1, n, level, r, y, norm, count, store)
+            _put(BUS_AT + 2, n, drive * w, r, y, norm, count, store)
             product[0] += level
             product[1] += drive * w
         # ---- controller: measured pair current against the reference that the recorded inputs give
@@ -482,7 +385,7 @@ def fill_statistics(
             for j in range(3):
                 half = x[j] if x[j] < np.pi else x[j] - np.pi
                 share = min(max(sign[j] * i[n, j] / pair_mean[n], -0.5), 1.5)
-                base = _COMMUTATION + 4 * j
+                base = COMMUTATION_AT + 4 * j
                 on, off = half - ramp, np.pi - ramp - half  # electrical angle inside the two edges
                 if -WINDOW < on < 0.0:
                     _put(base, n, 1.0, share - _shared(on, span), y, norm, count, store)
@@ -506,10 +409,10 @@ def fill_statistics(
                 at = n + 2 * reach * (1 - m)
                 later = total[at + 2 * reach + 1] - total[at + 1]
                 earlier = total[at] - total[at - 2 * reach]
-                _put(_CONTROL + m, n, (later - earlier) / (2 * reach), r, y, norm, count, store)
+                _put(CONTROL_AT + m, n, (later - earlier) / (2 * reach), r, y, norm, count, store)
     # i^2 counts from its mean by the instrument's weight: an inductance that is merely another leaves no trace then
     for j in range(3):
-        m = j * _PER_PHASE + 3
+        m = j * PER_PHASE + 3
         if norm[m] > WEAKEST_INSTRUMENT * power[m]:
             mean = cross[j] / norm[m]
             y[m + 1] -= mean * y[m]
@@ -519,12 +422,12 @@ def fill_statistics(
                 store[m + 1] -= mean * store[m]
     if has_bus:
         # current and power likewise, so that a supply that is merely another leaves its trace in the constant alone
-        for m in (_BUS + 1, _BUS + 2):
-            mean = product[m - _BUS - 1] / norm[_BUS]
-            y[m] -= mean * y[_BUS]
-            norm[m] = max(norm[m] - mean * product[m - _BUS - 1], 1e-3 * norm[m])
+        for m in (BUS_AT + 1, BUS_AT + 2):
+            mean = product[m - BUS_AT - 1] / norm[BUS_AT]
+            y[m] -= mean * y[BUS_AT]
+            norm[m] = max(norm[m] - mean * product[m - BUS_AT - 1], 1e-3 * norm[m])
             if store is not None:
-                store[m] -= mean * store[_BUS]
+                store[m] -= mean * store[BUS_AT]
     for m in range(y.shape[0]):
         if norm[m] < WEAKEST_INSTRUMENT * power[m]:
             norm[m] = WEAKEST_INSTRUMENT * power[m]
@@ -537,7 +440,7 @@ def fill_statistics(
     if y[LATTICE] > 0.0:  # so few values tell that there is none, but not its spacing
         y[LATTICE] = lattice(speed)
     if y[LATTICE] > 0.0:
-        count[_CONTROL:_COMMUTATION] = 0  # the slope of a reference made of rounded speeds is that of the rounding
+        count[CONTROL_AT:COMMUTATION_AT] = 0  # the slope of a reference made of rounded speeds is that of the rounding
     count[LATTICE] = n_time
     norm[LATTICE] = 1.0
     y[OSCILLATION] = np.sqrt(play_power / n_time)
