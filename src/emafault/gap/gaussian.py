@@ -135,9 +135,9 @@ class Gaussian:
         """(statistic, free) forward differences; parameters of disjoint recordings are moved together.
 
         A twin may know some derivatives exactly from others: ``derived`` names them and
-        ``derive(name, values, derivative, recording)`` gives the rows of one recording from a function that returns those of another parameter. What
-        cancels exactly in truth then cancels here too, where noisy differences would feign information. ``exact`` False
-        leaves this out, for a few parameters that nothing else can cancel.
+        ``derive(name, values, derivative, recording)`` gives the rows of one recording from a function that returns
+        those of another parameter. What cancels exactly in truth then cancels here too, where noisy differences would
+        feign information. ``exact`` False leaves this out, for a few parameters that nothing else can cancel.
         """
         derived = set(getattr(self.twin, "derived", ())) if exact else set()
         known = [m for m in free if self.parameters[m].name in derived]
@@ -199,7 +199,7 @@ class Gaussian:
         self._taken.append((values.copy(), jacobian))
         return jacobian
 
-    # ---- fits
+    # ---- points and steps
     def prior(self, free: Sequence[int], widened: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
         """Means and standard deviations of the free parameters; widened ones spread over their bounds."""
         mean, sd = self.mean[list(free)].copy(), self.sd[list(free)].copy()
@@ -321,7 +321,7 @@ class Gaussian:
         residual = self.whiten(self.observed - point.prediction - point.jacobian @ (values - point.values)[free])
         return point.objective - float(residual @ residual + (((values[free] - mean) / sd) ** 2).sum())
 
-    # ---- effects
+    # ---- sets
     def effect_parameters(self, hypothesis: Hypothesis) -> list[int]:
         """Indices of the hypothesis' parameters."""
         return [self.names[n] for n in hypothesis.parameters]
