@@ -5,7 +5,7 @@
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -119,7 +119,7 @@ def write_key(
     key: dict = {"case": case.to_dict(), "detectability": None, "fault_sd": None, "nearest_rival": None}
     key["actuator"], key["noise"] = asdict(actuator), asdict(noise)
     if case.effects:
-        detector = detector_of(case, actuator, noise, truth)
+        detector = Detector(case, actuator, noise, truth)
         found = detector.detectability()
         key["detectability"] = {"nominal": found.nominal, "members": found.members}
         key["fault_sd"] = found.fault_sd
@@ -128,13 +128,6 @@ def write_key(
             nearest = min(distances, key=lambda r: distances[r])
             key["nearest_rival"] = {"effect": nearest, "distance": distances[nearest]}
     replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(key, indent=1)))
-
-
-def detector_of(case: Case, actuator: ActuatorParameters, noise: SensorNoise, truth) -> Detector:
-    """The distances of a case from its noise-free signals."""
-    without = replace(case, effects={}, forms=())
-    plain = simulate_truth(without, actuator, STEP) if case.forms else None
-    return Detector(case, actuator, noise, truth, plain)
 
 
 def near_rivals(effect: str) -> list[str]:
@@ -150,5 +143,5 @@ def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
         return {}
     case = case_from_dict(key["case"])
     actuator, noise = ActuatorParameters(**key["actuator"]), SensorNoise(**key["noise"])
-    detector = detector_of(case, actuator, noise, simulate_truth(case, actuator))
+    detector = Detector(case, actuator, noise, simulate_truth(case, actuator))
     return {rival: detector.distance_to(rival) for rival in wanted}

@@ -41,8 +41,7 @@ class Detectability:
 class Detector:
     """Distances of one case. Everything is measured from the *base*: the case's own unit and faults without any effect.
 
-    A nuisance is counted in units of its prior's standard deviation. Where another simulator made the truth, ``plain``
-    is the base by that one: what the two simulators differ by is no trace of an effect.
+    A nuisance is counted in units of its prior's standard deviation.
     """
 
     def __init__(
@@ -51,7 +50,6 @@ class Detector:
         actuator: ActuatorParameters,
         noise: SensorNoise,
         truth: Sequence[Mapping[str, np.ndarray]],
-        plain: Sequence[Mapping[str, np.ndarray]] | None = None,
     ):
         self.case, self.actuator = case, actuator
         self.unit = {k: dict(v) for k, v in case.tolerances.items()}
@@ -103,8 +101,7 @@ class Detector:
             self.base.append(base)
             blocks.append(block)
             repeats.append(shifts[0])
-            without = base if plain is None else view.statistics(coarser(fine, plain[m])[1])
-            deltas.append(view.whiten(less(view.statistics(shown), without))[0])
+            deltas.append(view.whiten(less(view.statistics(shown), base))[0])
         self.delta = np.concatenate(deltas)
         self.jacobian = np.concatenate(blocks)
         self.normal = cho_factor(np.eye(len(self.prior)) + self.jacobian.T @ self.jacobian)
