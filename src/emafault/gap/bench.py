@@ -126,7 +126,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     travel = float(np.ptp(theta))
     if travel > 1.0:
         by_speed = np.cumsum(recording.rotor_speed) * recording.interval
-        if not _alike_but_for_drift(theta, by_speed, recording.interval):
+        if not _follows(theta, by_speed)[0] and not _alike_but_for_drift(theta, by_speed, recording.interval):
             _refuse_unlike(path, "rotor_speed", "the rate of rotor_angle", theta, by_speed)
     if travel > 5.0:
         by_shaft = actuator.gear_ratio * (recording.output_position - recording.output_position[0])

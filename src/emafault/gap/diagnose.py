@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from .decide import Calibration, Decision, decide, is_named, share_left
+from .gaussian import Point
 from .how_far import Ladder, Rung, climb, closed
-from .inference import Candidate, Point, Problem
+from .inference import Candidate, Problem
 from .twin import INTERVAL, Twin
 from .where import beyond_specification, equation_of, where
 from .which import Search, confusability, search

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .inference import Candidate, Point, Problem
+from .gaussian import Point
+from .inference import Candidate, Problem
 from .twin import Twin
 
 PLACEBOS = 20

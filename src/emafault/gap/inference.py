@@ -8,8 +8,6 @@ import numpy as np
 from .gaussian import Gaussian, Point
 from .twin import Hypothesis
 
-__all__ = ["Candidate", "Point", "Problem"]
-
 #: objective per statistic below which a null fit is worth more rounds: it may yet be no gap at all
 NEAR = 20.0
 SETTLED = 1.0  # prior standard deviations that a fit within the noise may still move for its derivatives to be kept

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from .diagnose import Diagnosis
-from .inference import Candidate, Point, Problem
+from .gaussian import Point
+from .inference import Candidate, Problem
 from .twin import Twin
 
 SHORTLIST = 3

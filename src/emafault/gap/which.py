@@ -6,7 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from .inference import Candidate, Point, Problem
+from .gaussian import Point
+from .inference import Candidate, Problem
 from .twin import Hypothesis
 
 FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
@@ -139,7 +140,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         key = tuple(sorted(candidate.effects))
         if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
             return
-        if any(negligible(problem, by_id[e], candidate.point) for e in key):
+        if not _of_size(problem, candidate, by_id):
             return
         if key not in tried or candidate.gain > tried[key].gain:
             tried[key] = candidate
@@ -209,17 +210,17 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > least:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
-        candidates = _of_size(problem, candidates, by_id)
+        candidates = [c for c in candidates if _of_size(problem, c, by_id)]
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
-        candidates = _of_size(problem, candidates, by_id)
+        candidates = [c for c in candidates if _of_size(problem, c, by_id)]
     return null, candidates
 
 
-def _of_size(problem: Problem, candidates: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
-    """The candidates none of whose members is negligible."""
-    return [c for c in candidates if not any(negligible(problem, by_id[e], c.point) for e in c.effects)]
+def _of_size(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
+    """Whether no member of a candidate is negligible."""
+    return not any(negligible(problem, by_id[e], candidate.point) for e in candidate.effects)
 
 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
@@ -268,7 +269,7 @@ def _fitted_alike(
 
     def fitted(candidate: Candidate) -> Candidate | None:
         done = problem.polish(null, candidate, by_id)
-        return None if any(negligible(problem, by_id[e], done.point) for e in done.effects) else done
+        return done if _of_size(problem, done, by_id) else None
 
     first = None
     while ranked and first is None:
