@@ -93,15 +93,15 @@ def conduct_pair(
         last = h <= MAX_SEGMENT
         if not last:
             h = MAX_SEGMENT
-        K, slope = K_0 + gone * (dK + 0.5 * gone * ddK), dK + gone * ddK
-        torque, stiffness = T_0 + gone * (dT + 0.5 * gone * ddT), dT + gone * ddT
-        u0, gamma = (V if high else -V) - K * w - R * i, inverse_L
+        K, slope = (K_0 + gone * dK) + (0.5 * ddK) * (gone * gone), dK + gone * ddK
+        torque, stiffness = (T_0 + gone * dT) + (0.5 * ddT) * (gone * gone), dT + gone * ddT
+        u0, gamma = ((V if high else -V) - R * i) - K * w, inverse_L
         if saturation != 0.0:
             gamma *= 1.0 + saturation * i * i
         y1 = u0 * gamma
         a = (K * i - viscous * w - torque) * inverse_inertia
-        b = (K * y1 + w * (slope * i - stiffness) - viscous * a) * inverse_inertia
-        u1 = -slope * w * w - K * a - R * y1
+        b = ((w * (slope * i - stiffness) - viscous * a) + K * y1) * inverse_inertia
+        u1 = (-slope * w * w - K * a) - R * y1
         y2 = u1 * gamma
         if saturation != 0.0:
             rate = 2.0 * saturation * inverse_L * i * y1
@@ -110,28 +110,33 @@ def conduct_pair(
             if h * fastest > LARGEST_CHANGE:
                 h, last = LARGEST_CHANGE / fastest, False
         c = (K * y2 + slope * (2.0 * w * y1 + a * i) - stiffness * a - ddT * w * w - viscous * b) * inverse_inertia
-        u2 = -3.0 * slope * w * a - K * b - R * y2
+        u2 = (-3.0 * slope * w * a - R * y2) - K * b
         y3 = u2 * gamma
         if saturation != 0.0:
             y3 += 2.0 * rate * u1 + 2.0 * saturation * inverse_L * (y1 * y1 + i * y2) * u0
         y4 = -R * y3 * gamma
         y2, y3, y4 = y2 / 2.0, y3 / 6.0, y4 / 24.0
-        off = i - (top if high else bottom)
-        tripped = off * (off + h * (y1 + h * (y2 + h * (y3 + h * y4)))) < 0.0
+        a_2, b_2, b_6, c_6, c_24 = 0.5 * a, 0.5 * b, b / 6.0, c / 6.0, c / 24.0
+        goal = top if high else bottom
+        off = i - goal
+        end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
+        tripped = off * (end - goal) < 0.0
+        # a processor waits for one result after the other here: pairs of terms make the way to the next segment short
         if tripped:
             inverse = 1.0 / y1
-            u, q = -off * inverse, y2 * inverse
-            u *= 1.0 - u * (q - u * (2.0 * q * q - y3 * inverse))
-            rate = y1 + u * (2.0 * y2 + u * (3.0 * y3 + u * 4.0 * y4))
-            step = (off + u * (y1 + u * (y2 + u * (y3 + u * y4)))) / rate
+            u, q, r = -off * inverse, y2 * inverse, y3 * inverse
+            u *= 1.0 - u * (q - u * (2.0 * q * q - r))
+            square = u * u
+            missed = (off + u * y1) + square * ((y2 + u * y3) + square * y4)
+            step = missed * (inverse * ((1.0 - 2.0 * q * u) + (4.0 * q * q - 3.0 * r) * square))
             u -= step
             # one step of Newton from the reversed series leaves less than rounding, but where the current turns round
             if not (abs(step) <= 1e-5 * u and u <= h):
                 u = crossing(off, y1, y2, y3, y4, h)
-            h = u
-        turned = gone + h * (w + h * (0.5 * a + h * (b / 6.0 + h * c / 24.0)))
-        faster = w + h * (a + h * (0.5 * b + h * c / 6.0))
-        end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
+            h, end = u, goal
+        square = h * h
+        faster = (w + h * a) + square * (b_2 + h * c_6)
+        turned = (gone + h * w) + square * ((a_2 + h * b_6) + square * c_24)
         if moving != 0:
             if moving * faster <= 0.0 or turned >= upper or turned <= lower:
                 return segments, t, i, w, gone, area, high

@@ -200,7 +200,7 @@ def fill_statistics(
     norm[:] = 1e-12
     count[:] = 0
     power, cross, cross_power, product = np.zeros(y.shape[0]), np.zeros(3), np.zeros(3), np.zeros(2)
-    ramp = np.pi / 6.0
+    ramp, pairs = np.pi / 6.0, int(np.round(poles))
     w_all, acceleration, slow = np.empty(n_time), np.empty(n_time), np.empty(n_time)
     speed_and_acceleration(theta, dt, w_all, acceleration, slow)
     torque = np.empty(n_time)
@@ -226,7 +226,9 @@ def fill_statistics(
         weight = min(max(abs(w) / REST_SPEED - 1.0, 0.0), 1.0)
         level = 0.5 * (abs(i[n, 0]) + abs(i[n, 1]) + abs(i[n, 2]))
         cos_1, sin_1 = np.cos(middle), np.sin(middle)
-        cos_p, sin_p = np.cos(poles * middle), np.sin(poles * middle)
+        cos_p, sin_p = cos_1, sin_1
+        for _ in range(1, pairs):
+            cos_p, sin_p = cos_p * cos_1 - sin_p * sin_1, sin_p * cos_1 + cos_p * sin_1
         turn_cos[0], turn_sin[0] = cos_1, sin_1
         for o in range(1, _ORDER_LIST.shape[0]):
             u, v = _MADE_FROM[o, 0], _MADE_FROM[o, 1]
@@ -235,16 +237,15 @@ def fill_statistics(
         drive, sum_r, sum_f = torque[n], 0.0, 0.0
         for j in range(3):
             x[j] = _wrap(poles * middle - AXIS[j], TWO_PI)
-            if span < 1e-6:
-                f[j], slope[j] = trapezoid(x[j], ramp)
-            else:
-                f_low, _ = trapezoid(x[j] - span, ramp)
-                f_mid, slope[j] = trapezoid(x[j], ramp)
-                f_high, _ = trapezoid(x[j] + span, ramp)
-                f[j] = (f_low + 4.0 * f_mid + f_high) / 6.0
-            sum_f += f[j]
             half = x[j] if x[j] < np.pi else x[j] - np.pi
             sign[j] = 1.0 if x[j] < np.pi else -1.0
+            f[j], slope[j] = sign[j], 0.0
+            if not ramp + span < half < np.pi - ramp - span:
+                f[j], slope[j] = trapezoid(x[j], ramp)
+                if span >= 1e-6:
+                    f_low, f_high = trapezoid(x[j] - span, ramp)[0], trapezoid(x[j] + span, ramp)[0]
+                    f[j] = (f_low + 4.0 * f[j] + f_high) / 6.0
+            sum_f += f[j]
             plateau[j] = 1.0 if ramp + margin < half < np.pi - ramp - margin else 0.0
             off_now = 1.0 if half > np.pi - ramp + margin or half < ramp - margin else 0.0
             floating[j] = off_now * was_off[j]
