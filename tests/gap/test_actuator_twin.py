@@ -62,9 +62,21 @@ def test_how_a_speed_was_rounded_is_told(way, sign):
     time = 2e-4 * np.arange(2000)
     angle = sign * 60.0 * time**2 + 1e-4 * np.random.default_rng(3).standard_normal(2000)
     speed = 3.0 * way(sign * 120.0 * time / 3.0)
-    found = rounding_of(speed, angle, 2e-4, 3.0)
+    found = rounding_of([(speed, angle, 2e-4)], 3.0)
     values = sign * np.array([0.3, 1.6, 2.7])
     np.testing.assert_array_equal(found(values), way(values))
+
+
+@pytest.mark.parametrize("way", [np.round, np.floor, np.trunc])
+def test_how_a_speed_was_rounded_is_told_by_all_recordings_together(way):
+    """Motions at a steady speed, whose error is that of one place between two steps."""
+    time = 2e-4 * np.arange(2000)
+    speeds = []
+    for number, share in enumerate((-20.35, 20.3, 31.65, -17.75, -26.1, 40.9)):
+        angle = 3.0 * share * time + 1e-4 * np.random.default_rng(number).standard_normal(2000)
+        speeds.append((np.full(2000, 3.0 * way(share)), angle, 2e-4))
+    values = np.array([0.3, -1.6, 2.7])
+    np.testing.assert_array_equal(rounding_of(speeds, 3.0)(values), way(values))
 
 
 @pytest.mark.parametrize("inside", [-0.3, -0.11, -0.02, 0.0, 0.05, 0.19, 0.4])

@@ -23,7 +23,7 @@ from .actuator_statistics import Computed, Nominal, compute
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
 NOISE_PAIRS = 4  # of noise and its negative, over which its bias of the statistics is averaged
 ROUNDED_ALIKE = 20  # samples
-ROUNDED_SURELY = 0.15  # steps, within which the mean error of a speed tells how it was rounded
+RATE_SPAN = 1e-3  # s, over which the angle's rate is averaged to tell which way a motion goes
 JITTER_REPEATS = 8
 RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
@@ -50,24 +50,37 @@ ALIKE = (
 )
 
 
-def rounding_of(
-    speed: np.ndarray, angle: np.ndarray, interval: float, step: float
-) -> Callable[[np.ndarray], np.ndarray]:
-    """How a speed (time,) recorded in steps was rounded: to the nearest, down, or towards zero.
+Rounding = Callable[[np.ndarray], np.ndarray]
 
-    Told by its mean error against the angle's rate (rad/s) in either direction, in steps.
+
+def rounding_of(speeds: Sequence[tuple[np.ndarray, np.ndarray, float]], step: float) -> Rounding:
+    """How the sensor rounds speeds to multiples of ``step`` (rad/s): to the nearest, down, or towards zero.
+
+    Told by the mean error against the angle's rate in either direction, over all recordings: where a speed stays
+    between the same two steps, one recording alone tells little.
+
+    Parameters
+    ----------
+    speeds : speed (time,) in rad/s, angle (time,) in rad and interval (s) of each recording
     """
-    if step <= 0.0:
-        return np.round
-    rate = np.diff(angle) / interval
-    error = (speed[1:] - rate) / step
-    ways = [error[way > step] for way in (rate, -rate)]
-    means = [float(np.mean(e)) for e in ways if len(e) >= MINIMUM_COUNT]
-    for rounding, expected in ((np.floor, (-0.5, -0.5)), (np.trunc, (-0.5, 0.5))):
-        wanted = [x for x, e in zip(expected, ways, strict=True) if len(e) >= MINIMUM_COUNT]
-        if means and np.max(np.abs(np.subtract(means, wanted))) < ROUNDED_SURELY:
-            return rounding
-    return np.round
+    ways: dict[float, list[np.ndarray]] = {1.0: [], -1.0: []}
+    for speed, angle, interval in speeds:
+        rate = np.diff(angle) / interval
+        error = (speed[1:] - rate) / step
+        steady = uniform_filter1d(rate, max(1, round(RATE_SPAN / interval)))
+        for way, errors in ways.items():
+            errors.append(error[way * steady > step])
+    seen = {way: np.concatenate(errors) for way, errors in ways.items()}
+
+    def misfit(expected: Mapping[float, float]) -> float:
+        return sum(len(e) * (float(np.mean(e)) - expected[way]) ** 2 for way, e in seen.items() if len(e))
+
+    found: Rounding = np.round
+    least = misfit({1.0: 0.0, -1.0: 0.0})
+    for rounding, expected in ((np.floor, {1.0: -0.5, -1.0: -0.5}), (np.trunc, {1.0: -0.5, -1.0: 0.5})):
+        if misfit(expected) < least:
+            found, least = rounding, misfit(expected)
+    return found
 
 
 @dataclass
@@ -83,7 +96,6 @@ class _Brought:
     usable: np.ndarray  # (statistic,) bool
     noise: dict[str, float]  # of the bench, by channel
     theta_0: float
-    rounding: Callable[[np.ndarray], np.ndarray]  # of a speed that is recorded in steps
     moment: float | None = None  # at which a step of the command came, from the sample before it to that after
     variances: dict[str, float] = field(default_factory=dict)  # of this recording's channels, as last compared
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
@@ -122,7 +134,12 @@ class ActuatorTwin:
         self.effects = {id: e for id, e in EFFECTS.items() if id not in exclude}
         self.parameters = parameters_of(actuator, recordings, self.effects)
         self.index = {p.name: m for m, p in enumerate(self.parameters)}
-        spacings = [b.computed.values[LATTICE] for b in self._brought.values()]
+        spacings = [float(b.computed.values[LATTICE]) for b in self._brought.values()]
+        self.rounding: Rounding = np.round
+        if max(spacings) > 0.0:  # of a speed that is recorded in steps
+            brought = [b for b, spacing in zip(self._brought.values(), spacings, strict=True) if spacing > 0.0]
+            speeds = [(b.signals["rotor_speed"], b.signals["rotor_angle"], b.nominal.interval) for b in brought]
+            self.rounding = rounding_of(speeds, float(np.median([s for s in spacings if s > 0.0])))
         self.hypotheses = hypotheses_of(self.parameters, self.effects, spacings)
         self._offset: dict[str, np.ndarray] = {}
         self._cache: dict[tuple[str, bytes], np.ndarray] = {}
@@ -144,8 +161,7 @@ class ActuatorTwin:
         usable = computed.count >= MINIMUM_COUNT
         if not nominal.has_end:
             usable[RIPPLED] = False
-        rounding = rounding_of(signals["rotor_speed"], theta, nominal.interval, float(computed.values[LATTICE]))
-        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0, rounding)
+        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
         if not nominal.has_end:
             brought.repeats = RIPPLE_REPEATS
         return brought
@@ -268,7 +284,7 @@ class ActuatorTwin:
             sigma = self._brought[name].noise.get("speed", 0.0)
             rng = np.random.default_rng(np.frombuffer(run.tobytes(), np.uint32))
             noisy = signals["rotor_speed"] + sigma * rng.standard_normal(len(signals["rotor_speed"]))
-            signals["rotor_speed"] = step * self._brought[name].rounding(noisy / step)
+            signals["rotor_speed"] = step * self.rounding(noisy / step)
         return self._compared(name, signals)
 
     def _compared(self, name: str, signals: dict) -> np.ndarray:
