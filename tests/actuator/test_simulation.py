@@ -159,6 +159,25 @@ def test_a_loop_in_two_phases_is_the_general_run(effects):
                 assert values == pytest.approx(slow[signal], rel=limit, abs=limit), (name, signal)
 
 
+@pytest.mark.parametrize(
+    ("name", "settings"), [("parabolic", {"acceleration": 0.3}), ("sine", {"amplitude": 0.01, "frequency": 2.0})]
+)
+def test_asymmetric_friction_and_a_constant_load_are_one_torque_break_away_included(name, settings):
+    """T_c (1 + a sign w) sign w = T_c sign w + a T_c. The static limits differ, but the ripple makes the rotor creep as
+    soon as the mean current holds the sliding friction, so that the limit hardly shows: by less than 5 mA of 0.06 A."""
+    a = 0.15
+    load = a * ACTUATOR.coulomb_friction * ACTUATOR.gear_ratio
+    causes = ({}, {"friction_asymmetry": {"a": a}}, {"load_constant": {"T": load}})
+    smooth = []
+    for effects in causes:
+        signals = simulate(make_runs(ACTUATOR, HEALTHY, effects=effects), command(name, 1.0, **settings), 1.0, 2e-4)
+        active = 0.5 * np.abs(signals["phase_current"][0]).sum(1)
+        smooth.append(np.convolve(active, np.full(50, 0.02), "valid"))  # over 10 ms
+    nominal, asymmetric, loaded = smooth
+    assert np.abs(asymmetric - nominal).max() > 0.1
+    assert np.abs(asymmetric - loaded).max() < 0.005
+
+
 @pytest.mark.parametrize("s", [0.05, 0.07])
 def test_a_saturating_inductance_at_the_current_limit_comes_to_an_end(s):
     """At 20 A the inductance is a twentieth of its own: segments must shorten and the run must not stall."""

@@ -194,6 +194,15 @@ def test_steps_alone_neither_explore_nor_confirm(shop):
         assert not set(side) <= steps
 
 
+def test_a_temperature_is_not_left_to_a_step_alone(shop):
+    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    plans = [(*kind, t, "unknown") for kind, t in ((moving, 45.0), (moving, 60.0), (step, 0.0), (moving, 20.0))]
+    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+    explore, _ = split_bench(bench)
+    smooth = [r for n, r in bench.items() if n in explore and not len(jumps_of(r.commanded_position))]
+    assert np.ptp([r.ambient_temperature for r in smooth]) > 38.0
+
+
 def test_the_one_recording_of_large_currents_explores(shop):
     quiet, hard = ("sine", {"amplitude": 0.004, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
     for place in range(4):

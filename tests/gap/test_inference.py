@@ -203,10 +203,30 @@ def test_what_is_left_is_judged_where_nothing_hunts():
     found = search(problem, twin.hypotheses, 3.0)
     best = found.candidates[0]
     assert best.effects == ("curve",)
-    everywhere = best.point.objective - len(problem.cells)
+    problem.set_covariance(best.point.values)  # as if what hunts counted in full
+    residual = problem.whiten(problem.observed - best.point.prediction)
+    everywhere = float(residual @ residual) - len(problem.cells)
     assert problem.excess(best.point) < 0.05 * everywhere
     evidence, _ = evidence_of(problem, found, twin.hypotheses)
     assert evidence.unexplained < MOST and evidence.acting < MOST
+
+
+def test_far_from_the_truth_an_erratic_recording_counts_no_more_than_the_others():
+    twin = Lines(9, curvature=0.3)
+    twin.erratic = lambda name: name == "two"
+    twin.data["two"] = twin.data["two"] + 50.0 * twin.sigma * twin.x**2
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    residual = problem.whiten(twin.observed(["one", "two"]) - null.prediction)
+    calm, erratic = (float(np.mean(residual[problem.rows[name]] ** 2)) for name in ("one", "two"))
+    assert 1.0 < calm and erratic == pytest.approx(calm, rel=0.3)
+    problem.set_covariance(null.values)
+    wild = problem.deviations()
+    twin.data["two"] = twin.data["one"]
+    same = Problem(twin, ["one", "two"])
+    same.set_covariance(null.values)
+    same.temper(null.prediction)  # what differs no more than the others do keeps its weight
+    np.testing.assert_array_equal(same.deviations(), wild)
 
 
 class HalfTold(Lines):
@@ -331,6 +351,22 @@ def test_a_rival_is_not_outdone_for_lack_of_convergence():
     assert len(groups(problem, null, [curve, short])[0]) == 1
     ranked = _fitted_alike(problem, null, [curve, short], by_id, 3.0)
     assert {c.effects for c in groups(problem, null, ranked)[0]} == {("curve",), ("bend",)}
+
+
+@pytest.mark.parametrize(("apart", "behind", "together"), [(8.0, 2.0, True), (8.0, 4.0, False), (14.0, 2.0, False)])
+def test_what_the_data_do_not_prefer_is_a_group_though_its_predictions_lie_a_little_apart(apart, behind, together):
+    twin = Alike(13, curvature=3.0)
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    by_id = {h.effect: h for h in twin.hypotheses}
+    curve, bend = (problem.polish(null, c, by_id) for c in problem.screen(null, twin.hypotheses))
+    wave = np.sin(25.0 * np.tile(twin.x, 2))
+    wave *= np.sqrt(apart / problem.squared_distance(null, problem.whiten(wave)))
+    prediction = curve.point.prediction + wave
+    residual = problem.whiten(problem.observed - prediction)
+    point = replace(bend.point, prediction=prediction, misfit=float(residual @ residual))
+    rival = replace(bend, point=point, gain=curve.gain - behind)
+    assert (len(groups(problem, null, [curve, rival])[0]) == 2) == together
 
 
 def test_an_effect_that_ends_off_is_no_candidate_and_the_null_has_what_it_found(monkeypatch):

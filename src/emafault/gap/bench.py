@@ -443,7 +443,8 @@ def _cost(
 
     every = ambient([*explore, *confirm])
     width = max(float(np.ptp(every)), 1.0)
-    cost = 2.0 * (1.0 - float(np.ptp(ambient(explore))) / width)
+    telling = [n for n in explore if n not in steps] or explore  # a temperature met after a step alone is hardly met
+    cost = 2.0 * (1.0 - float(np.ptp(ambient(telling))) / width)
     cost += abs(float(ambient(confirm).mean() - every.mean())) / width
     if len(confirm) > 1:
         cost += 0.5 * max(0.0, 0.5 - float(np.ptp(ambient(confirm))) / width)

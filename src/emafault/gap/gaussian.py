@@ -56,7 +56,8 @@ class Gaussian:
         for m, cell in enumerate(self.cells):
             rows.setdefault(cell.recording, []).append(m)
         self.rows = {name: np.array(r) for name, r in rows.items()}
-        self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
+        #: by recording: its rows, inverse of the covariance's Cholesky factor, standard deviations
+        self._blocks: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._taken: list[tuple[np.ndarray, np.ndarray]] = []  # points where nuisance derivatives were taken, and they
 
     def erratic(self, name: str) -> bool:
@@ -83,7 +84,6 @@ class Gaussian:
     def set_covariance(self, values: np.ndarray, shy: bool = False) -> None:
         """Take the statistics' covariance at a parameter point; ``shy`` all but ignores erratic recordings."""
         cov = self.twin.covariance(values, self.part)
-        self._blocks = []
         for name, rows in self.rows.items():
             block = cov[np.ix_(rows, rows)]
             scale = np.sqrt(np.diag(block))
@@ -92,20 +92,36 @@ class Gaussian:
             correlation = 0.98 * correlation + 0.02 * np.eye(len(rows))
             if shy and self.erratic(name):
                 scale = 30.0 * scale
-            self._blocks.append((rows, scale[:, None] * np.linalg.cholesky(correlation)))
+            factor = np.linalg.cholesky(correlation)
+            inverse = solve_triangular(factor, np.diag(1.0 / scale), lower=True, check_finite=False)
+            self._blocks[name] = rows, inverse, scale
+
+    def temper(self, prediction: np.ndarray) -> None:
+        """Let an erratic recording count no more per statistic than the others do at this prediction.
+
+        Far from the truth it differs by anything at all, and leads a fit astray.
+        """
+        residual = self.whiten(self.observed - prediction)
+        misfit = {name: float(np.mean(np.square(residual[rows]))) for name, rows in self.rows.items()}
+        calm = [m for name, m in misfit.items() if not self.erratic(name)]
+        most = max(1.0, float(np.mean(calm))) if calm else np.inf
+        for name, (rows, inverse, scale) in self._blocks.items():
+            if self.erratic(name) and misfit[name] > most:
+                wider = np.sqrt(misfit[name] / most)
+                self._blocks[name] = rows, inverse / wider, scale * wider
 
     def whiten(self, x: np.ndarray) -> np.ndarray:
         """C^-1/2 x for (statistic,) or (statistic, column)."""
         out = np.empty_like(x, dtype=float)
-        for rows, factor in self._blocks:
-            out[rows] = solve_triangular(factor, x[rows], lower=True, check_finite=False)
+        for rows, inverse, _ in self._blocks.values():
+            out[rows] = inverse @ x[rows]
         return out
 
     def deviations(self) -> np.ndarray:
         """(statistic,) standard deviations."""
         out = np.empty(len(self.cells))
-        for rows, factor in self._blocks:
-            out[rows] = np.sqrt((factor**2).sum(1))
+        for rows, _, scale in self._blocks.values():
+            out[rows] = scale
         return out
 
     # ---- derivatives

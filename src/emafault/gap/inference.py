@@ -57,6 +57,8 @@ class Problem(Gaussian):
                     settle(values, self.part)
                 self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
+            if round_ >= shy and (round_ <= first or far):
+                self.temper(prediction)
             # derivatives of the first round serve until the fit may end, unless it has moved far from them
             if not 0 < round_ <= first or shift > FAR:
                 jacobian = self.derivatives(values, prediction)
@@ -113,6 +115,7 @@ class Problem(Gaussian):
         self.set_covariance(candidate.point.values)
         values = candidate.point.values
         prediction = self.predict(values)[0]
+        self.temper(prediction)
         base = self.derivatives(values, prediction)
         best = self.point(null.values, self.predict(null.values)[0], null.jacobian, self.nuisances)
         moved = self.solve(best.values, best.prediction, null.jacobian, self.nuisances)

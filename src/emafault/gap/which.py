@@ -422,6 +422,11 @@ def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> li
         # two predictions so far apart differ in log evidence by about as much from the noise of the data alone
         if distance < GROUP_DISTANCE and first.gain - gain < GROUP_DISTANCE / 2 + 2.0 * np.sqrt(distance):
             members.append(replace(other, gain=gain))
+            continue
+        # scatter puts predictions further apart than they are: the data do not prefer one of these either
+        gain = max(gain, other.gain)
+        if distance < 2.0 * GROUP_DISTANCE and first.gain - gain < GROUP_DISTANCE / 2:
+            members.append(replace(other, gain=gain))
     return [members]
 
 

@@ -25,7 +25,6 @@ NOISE_PAIRS = 4  # of noise and its negative, over which its bias of the statist
 ROUNDED_ALIKE = 20  # samples
 RATE_SPAN = 1e-3  # s, over which the angle's rate is averaged to tell which way a motion goes
 JITTER_REPEATS = 8
-RIPPLE_REPEATS = 2  # simulations behind a prediction where mean currents alone leave the ripple in every residual
 TOGETHER = 0.5  # share of the scatter that its repeats' own correlations are believed for
 HUNTING = 3.0  # on the variance of what hunts: trusted as far as its repeats scatter, it leads fits astray
 FIRST_REPEATS = 4  # where a fit starts
@@ -101,7 +100,6 @@ class _Brought:
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
-    repeats: int = 1  # simulations behind a prediction
 
 
 class ActuatorTwin:
@@ -162,8 +160,6 @@ class ActuatorTwin:
         if not nominal.has_end:
             usable[RIPPLED] = False
         brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
-        if not nominal.has_end:
-            brought.repeats = RIPPLE_REPEATS
         return brought
 
     def erratic(self, name: str) -> bool:
@@ -273,9 +269,6 @@ class ActuatorTwin:
         return out
 
     def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
-        b = self._brought[name]
-        if b.repeats > 1:
-            return self._repeats(name, run, self._shifts(name)[:, : b.repeats]).mean(axis=0)
         return self._as_recorded(name, run, self._simulate(name, run))
 
     def _as_recorded(self, name: str, run: np.void, signals: dict) -> np.ndarray:
@@ -408,13 +401,13 @@ class ActuatorTwin:
             run = self._runs(values[None, :], name)[0]
             count = FIRST_REPEATS if first else JITTER_REPEATS
             jitter = self._jitter(name, run, self._shifts(name)[:, :count])
-            b.jitter = np.diag(jitter) / b.repeats
+            b.jitter = np.diag(jitter)
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
             cov = noise_covariance(b.by_channel, b.noise)
             # the recording scatters once and the simulations it is compared with once more
             aligned = COMMUTATION_FLOOR**2 * (1.0 + 0.0025 * b.computed.count[COMMUTATION_AT:])
-            cov += (1.0 + 1.0 / b.repeats) * jitter
+            cov += 2.0 * jitter
             extra = (BIAS_TRUST * self._offset.get(name, np.zeros(SIZE))) ** 2
             extra[COMMUTATION_AT:] += aligned
             # a speed that changes slowly is rounded the same way for many samples on end
@@ -482,8 +475,6 @@ class ActuatorTwin:
         """(statistic, statistic) covariance of a single prediction by where its switching falls."""
         b = self._brought[name]
         repeats = self._repeats(name, run, shifts)
-        if b.repeats > 1:  # the first of them are the prediction of this very run
-            self._cache[name, run.tobytes()] = repeats[: b.repeats].mean(axis=0)
         apart = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
         variance = np.square(apart).sum(axis=0)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly
