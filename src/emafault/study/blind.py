@@ -130,7 +130,7 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
             continue
         best = set(verdict["evidence"]["candidates"][0][0])
         if key["case"]["left_out"] and _twins(best, truth):
-            continue  # only a break-away tells them apart: nothing to learn from
+            continue  # nothing tells them apart, so there is nothing to learn from
         right = not key["case"]["left_out"] and _names(verdict, best, truth, key["detectability"]["members"])
         seen.append(evidence.gap_features())
         right_rows.append(evidence.right_features())
