@@ -52,12 +52,13 @@ class Problem(Gaussian):
             if round_ == 0:
                 self.low[unit] = np.maximum(self.low[unit], self.mean[unit] - LEASH * self.sd[unit])
                 self.high[unit] = np.minimum(self.high[unit], self.mean[unit] + LEASH * self.sd[unit])
-            if round_ <= first or far:
+            renewed = round_ <= first or far
+            if renewed:
                 if settle is not None:
                     settle(values, self.part)
                 self.set_covariance(values, shy=round_ < shy)
             prediction = self.predict(values)[0]
-            if round_ >= shy and (round_ <= first or far):
+            if renewed and round_ >= shy:
                 self.temper(prediction)
             # derivatives of the first round serve until the fit may end, unless it has moved far from them
             if not 0 < round_ <= first or shift > FAR:

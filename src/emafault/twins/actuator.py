@@ -159,8 +159,7 @@ class ActuatorTwin:
         usable = computed.count >= MINIMUM_COUNT
         if not nominal.has_end:
             usable[RIPPLED] = False
-        brought = _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
-        return brought
+        return _Brought(recording, signals, nominal, command, jumps, computed, usable, {}, theta_0)
 
     def erratic(self, name: str) -> bool:
         """Whether small changes may change a recording's statistics abruptly: after a step the actuator hunts."""
