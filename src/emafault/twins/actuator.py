@@ -134,9 +134,9 @@ class ActuatorTwin:
         self.index = {p.name: m for m, p in enumerate(self.parameters)}
         spacings = [float(b.computed.values[LATTICE]) for b in self._brought.values()]
         self.rounding: Rounding = np.round
-        if max(spacings) > 0.0:  # of a speed that is recorded in steps
-            brought = [b for b, spacing in zip(self._brought.values(), spacings, strict=True) if spacing > 0.0]
-            speeds = [(b.signals["rotor_speed"], b.signals["rotor_angle"], b.nominal.interval) for b in brought]
+        if max(spacings) > 0.0:
+            stepped = [b for b, spacing in zip(self._brought.values(), spacings, strict=True) if spacing > 0.0]
+            speeds = [(b.signals["rotor_speed"], b.signals["rotor_angle"], b.nominal.interval) for b in stepped]
             self.rounding = rounding_of(speeds, float(np.median([s for s in spacings if s > 0.0])))
         self.hypotheses = hypotheses_of(self.parameters, self.effects, spacings)
         self._offset: dict[str, np.ndarray] = {}
@@ -209,7 +209,7 @@ class ActuatorTwin:
 
         def work(item):
             key, (name, run) = item
-            return key, self._statistics_of(name, run)
+            return key, self._as_recorded(name, run, self._simulate(name, run))
 
         if self.threads > 1 and len(new) > 1:
             with ThreadPoolExecutor(self.threads) as pool:
@@ -266,9 +266,6 @@ class ActuatorTwin:
         out = dict(zip((*keys, "output_position", "bus_voltage"), arrays, strict=True))
         out["commanded_position"] = b.signals["commanded_position"][:n]
         return out
-
-    def _statistics_of(self, name: str, run: np.void) -> np.ndarray:
-        return self._as_recorded(name, run, self._simulate(name, run))
 
     def _as_recorded(self, name: str, run: np.void, signals: dict) -> np.ndarray:
         step = float(run["speed_quantisation_step"])
