@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from emafault.actuator.commands import command_positions
+from emafault.actuator.conduction import LANES
 from emafault.actuator.fixed_step import simulate_fixed_step
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
@@ -49,8 +50,10 @@ def main() -> None:
     actuator, interval = reference_actuator(), 2e-4
     runs = make_runs(actuator, np.zeros((1, 6)))
     command = command_positions("parabolic", {"acceleration": 0.3}, 1.0, actuator.control_period)
+    eight = make_runs(actuator, np.zeros((LANES, 6)))
     engines: dict[str, tuple[Callable[[float], dict], float, int]] = {  # engine, timed duration (s), repeats
-        "event-driven, compiled": (lambda d: simulate(runs, command, d, interval), 1.0, 7),
+        "event-driven, compiled, eight runs side by side": (lambda d: simulate(eight, command, d, interval), LANES, 7),
+        "event-driven, compiled, one run alone": (lambda d: simulate(runs, command, d, interval), 1.0, 7),
         "fixed step 1 us, compiled": (lambda d: simulate_fixed_step(runs, command, d, interval, 1e-6), 0.5, 2),
         "fixed step 2 us, compiled": (lambda d: simulate_fixed_step(runs, command, d, interval, 2e-6), 0.5, 2),
         "SciPy solve_ivp (RK45, rtol 1e-7)": (lambda d: simulate_solve_ivp(actuator, command, d, interval), window, 0),

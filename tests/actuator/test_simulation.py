@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from emafault.actuator.commands import command_positions, jumps_of
-from emafault.actuator.conduction import NEVER, passing
+from emafault.actuator.conduction import LANES, NEVER, passing
 from emafault.actuator.parameters import make_runs
-from emafault.actuator.simulate import simulate
+from emafault.actuator.simulate import simulate, simulate_each
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 
@@ -56,6 +56,22 @@ def test_threads_and_neighbours_change_no_bit():
     for name, values in one.items():
         assert np.array_equal(values, two[name]), name
         assert np.array_equal(values[2:3], alone[name]), name
+
+
+def test_each_run_is_the_same_among_runs_of_other_lengths_commands_and_effects():
+    effects = {name: {p: 0.5 * (q.low + q.high) for p, q in e.parameters.items()} for name, e in EFFECTS.items()}
+    runs = np.concatenate([make_runs(ACTUATOR, FAULT, effects={name: e}) for name, e in effects.items()])
+    assert len(runs) > 2 * LANES
+    duration = 0.05 + 0.002 * np.arange(len(runs))
+    interval = np.array([5e-5, 1.3e-4, 2e-4, 1e-3])[np.arange(len(runs)) % 4]
+    records = [int(d / i) for d, i in zip(duration, interval)]
+    commands = [command("step", d, amplitude=0.02 * (-1) ** n, time=0.01) for n, d in enumerate(duration)]
+    together = simulate_each(runs, commands, interval, records)
+    for n in range(len(runs)):
+        alone = simulate_each(runs[n : n + 1], commands[n : n + 1], interval[n : n + 1], records[n : n + 1])[0]
+        assert np.abs(alone["rotor_speed"]).max() > 10.0
+        for name, values in alone.items():
+            assert np.array_equal(values, together[n][name]), (n, name)
 
 
 @pytest.mark.parametrize("fault", [HEALTHY, FAULT])

@@ -296,10 +296,9 @@ def test_an_averaged_prediction_keeps_the_instant_of_a_step(shop, instant, monke
         twin.settle(point, ["step"])
     ticks, simulated = [], twin._simulate
 
-    def counting(name, run, command=None):
-        if command is not None:
-            ticks.append(int(np.argmax(command > 0.005)))
-        return simulated(name, run, command)
+    def counting(tasks):
+        ticks.extend(int(np.argmax(task.command > 0.005)) for task in tasks)
+        return simulated(tasks)
 
     monkeypatch.setattr(twin, "_simulate", counting)
     twin.smooth(values, ["step"])

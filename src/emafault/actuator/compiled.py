@@ -28,3 +28,4 @@ import numba  # noqa: E402
 numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]  # type: ignore[attr-defined]
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 compiled = numba.njit(cache=True, **OPTIONS)
+compiled_inline = numba.njit(cache=True, forceinline=True, **OPTIONS)  # into its one caller, whose arrays it takes

@@ -1,12 +1,14 @@
 """Simulation of batches of runs: noise-free recorded signals from run records and a command."""
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 
 import numpy as np
 
 from ..errors import InputError
+from .conduction import LANES
 from .kernel import run_batch
+from .state import has_extras
 
 PHASE_SIGNALS = ("phase_voltage", "phase_current", "phase_current_end")
 SIGNALS = (*PHASE_SIGNALS, "rotor_speed", "rotor_angle", "output_position", "bus_voltage")
@@ -53,21 +55,52 @@ def simulate(
     time = time_axis(duration, interval)
     command = np.ascontiguousarray(np.atleast_2d(command), dtype=float)
     n = len(runs)
-    out = {name: np.empty((n, len(time), 3)) for name in PHASE_SIGNALS}
-    out |= {name: np.empty((n, len(time))) for name in SIGNALS[3:]}
-    shared = len(command) == 1
-    arrays = [out[name] for name in SIGNALS]
-
-    def part(rows: slice) -> None:
-        run_batch(runs[rows], command if shared else command[rows], shared, interval, *(a[rows] for a in arrays))
-
-    if threads <= 1 or n < 2:
-        part(slice(0, n))
-    else:
-        pieces = min(n, 4 * threads)
-        bounds = np.linspace(0, n, pieces + 1).astype(int)
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(part, [slice(a, b) for a, b in pairwise(bounds) if b > a]))
+    out = _run(runs, command, np.full(n, float(interval)), np.full(n, len(time)), threads)
     position = commanded_position(command, float(runs["control_period"][0]), time)
-    out["commanded_position"] = np.broadcast_to(position, (n, len(time))).copy() if shared else position
+    out["commanded_position"] = np.broadcast_to(position, (n, len(time))).copy() if len(command) == 1 else position
+    return out
+
+
+def simulate_each(
+    runs: np.ndarray, commands: Sequence[np.ndarray], interval: Sequence[float], records: Sequence[int]
+) -> list[dict[str, np.ndarray]]:
+    """Simulate runs that differ in command (each (tick+1,), rad), interval (s) and number of records.
+
+    Returns
+    -------
+    for every run the signals of ``simulate`` but the command, without the axis of the runs
+    """
+    command = np.empty((len(runs), max(map(len, commands))))
+    for row, given in zip(command, commands, strict=True):
+        row[: len(given)], row[len(given) :] = given, given[-1]
+    out = _run(runs, command, np.asarray(interval, float), np.asarray(records, int))
+    return [{name: values[r, :n] for name, values in out.items()} for r, n in enumerate(records)]
+
+
+def _run(
+    runs: np.ndarray, command: np.ndarray, interval: np.ndarray, records: np.ndarray, threads: int = 1
+) -> dict[str, np.ndarray]:
+    """Recorded signals of ``run_batch``, as long as those of the longest run."""
+    shape = len(runs), int(records.max())
+    shapes = [(*shape, 3)] * len(PHASE_SIGNALS) + [shape] * (len(SIGNALS) - len(PHASE_SIGNALS))
+    ends = np.cumsum([np.prod(s) for s in shapes])
+    # in one piece, which the next call gets again; many large ones go back to the system, and new pages cost as much
+    # as the simulation
+    pieces = np.split(np.empty(ends[-1]), ends[:-1])
+    out = {name: piece.reshape(s) for name, piece, s in zip(SIGNALS, pieces, shapes, strict=True)}
+    extras = np.array([has_extras(run) for run in runs])
+    parts = []
+    for alike in (np.flatnonzero(~extras), np.flatnonzero(extras)):
+        shares = min(4 * threads, -(-len(alike) // LANES)) if threads > 1 else 1
+        parts += [rows for rows in np.array_split(alike, max(1, shares)) if len(rows)]
+
+    def part(rows: np.ndarray) -> None:
+        run_batch(runs, rows, command, interval, records, *(out[name] for name in SIGNALS))
+
+    if threads <= 1 or len(parts) < 2:
+        for rows in parts:
+            part(rows)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(part, parts))
     return out

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..actuator.commands import jumps_of, resample, with_corners
-from ..actuator.kernel import run_actuator
+from ..actuator.conduction import LANES
 from ..actuator.parameters import ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
+from ..actuator.simulate import simulate_each
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
 from ..gap.twin import Cell
@@ -100,6 +101,16 @@ class _Brought:
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A run to compare with a recording; its command (tick+1,) if not the recording's, and how far that is off."""
+
+    name: str
+    run: np.void
+    command: np.ndarray | None = None
+    offset: float = 0.0
 
 
 class ActuatorTwin:
@@ -207,16 +218,8 @@ class ActuatorTwin:
                 tasks.append(key)
         new = list(seen.items())
 
-        def work(item):
-            key, (name, run) = item
-            return key, self._as_recorded(name, run, self._simulate(name, run))
-
-        if self.threads > 1 and len(new) > 1:
-            with ThreadPoolExecutor(self.threads) as pool:
-                done = list(pool.map(work, new))
-        else:
-            done = [work(item) for item in new]
-        self._cache.update(done)
+        found = self._statistics([_Task(name, run) for _, (name, run) in new])
+        self._cache.update(zip((key for key, _ in new), found, strict=True))
         out = []
         rows = len(values)
         for m, name in enumerate(part):
@@ -255,17 +258,38 @@ class ActuatorTwin:
     def _off(self, parameter: str) -> float:
         return self.parameters[self.index[parameter]].off
 
-    def _simulate(self, name: str, run: np.void, command: np.ndarray | None = None, samples: int | None = None) -> dict:
-        """Signals of a run as long as the recording, or of its first ``samples``."""
-        b = self._brought[name]
-        command = b.command if command is None else command
-        n = samples or len(b.recording.time)
-        arrays = [np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), *(np.empty(n) for _ in range(4))]
-        run_actuator(run, command, b.nominal.interval, *arrays)
-        keys = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle")
-        out = dict(zip((*keys, "output_position", "bus_voltage"), arrays, strict=True))
-        out["commanded_position"] = b.signals["commanded_position"][:n]
+    def _statistics(self, tasks: Sequence[_Task]) -> list[np.ndarray]:
+        """(statistic,) statistics of every task's run as they compare with its recording's."""
+        # runs go side by side, best with those that are as long
+        order = sorted(range(len(tasks)), key=lambda n: len(self._brought[tasks[n].name].recording.time))
+        parts = [order[at : at + LANES] for at in range(0, len(order), LANES)]
+
+        def work(part: list[int]) -> list[np.ndarray]:
+            chosen = [tasks[n] for n in part]
+            return [self._as_recorded(t.name, t.run, s) for t, s in zip(chosen, self._simulate(chosen), strict=True)]
+
+        if self.threads > 1 and len(parts) > 1:
+            with ThreadPoolExecutor(self.threads) as pool:
+                done = list(pool.map(work, parts))
+        else:
+            done = [work(part) for part in parts]
+        found = dict(zip(order, (values for part in done for values in part), strict=True))
+        return [found[n] for n in range(len(tasks))]
+
+    def _simulate(self, tasks: Sequence[_Task], samples: int | None = None) -> list[dict]:
+        """Signals of every task's run, as long as its recording or of its first ``samples``."""
+        brought = [self._brought[t.name] for t in tasks]
+        records = [samples or len(b.recording.time) for b in brought]
+        commands = [b.command if t.command is None else t.command for t, b in zip(tasks, brought, strict=True)]
+        runs = np.array([t.run for t in tasks])
+        out = simulate_each(runs, commands, [b.nominal.interval for b in brought], records)
+        for signals, b, t, n in zip(out, brought, tasks, records, strict=True):
+            signals["commanded_position"] = b.signals["commanded_position"][:n] + t.offset
         return out
+
+    def simulated(self, name: str, runs: Sequence[np.void]) -> list[dict]:
+        """Noise-free signals of runs (records of RUN_DTYPE) under a recording's command."""
+        return self._simulate([_Task(name, run) for run in runs])
 
     def _as_recorded(self, name: str, run: np.void, signals: dict) -> np.ndarray:
         step = float(run["speed_quantisation_step"])
@@ -291,7 +315,9 @@ class ActuatorTwin:
         """
         runs = {name: self._runs(values[None, :], name)[0] for name in part}
         with ThreadPoolExecutor(self.threads) as pool:
-            clean = dict(zip(part, pool.map(lambda name: self._align(name, runs[name]), part), strict=True))
+            list(pool.map(lambda name: self._place_steps(name, runs[name]), part))
+            clean = dict(zip(part, self._simulate([_Task(name, runs[name]) for name in part]), strict=True))
+            list(pool.map(lambda name: self._align(name, clean[name]), part))
             for channel, value in self._noise(clean).items():
                 for name in part:
                     self._brought[name].noise[channel] = value
@@ -299,12 +325,9 @@ class ActuatorTwin:
         self._cache.clear()
         self._averages.clear()
 
-    def _align(self, name: str, run: np.void) -> dict:
-        """Start angle and the instants of command steps; returns noise-free signals."""
+    def _align(self, name: str, clean: dict) -> None:
+        """Take the start angle, and how far the rotor goes astray, from noise-free signals."""
         b = self._brought[name]
-        if len(b.jumps):
-            self._place_steps(name, run)
-        clean = self._simulate(name, run)
         first = max(3, min(len(clean["rotor_angle"]) // 20, round(5e-3 / b.nominal.interval)))
         drift = float(np.median((b.signals["rotor_angle"] - clean["rotor_angle"])[:first]))
         if abs(drift) < 0.2:
@@ -313,18 +336,21 @@ class ActuatorTwin:
         least, most = START_SCATTER
         least *= max(1.0, b.nominal.interval / 2e-4)  # the fewer samples, the more each of them weighs
         b.start_scatter = float(np.clip(ASTRAY * np.std(apart), least, most))
-        return clean
 
     def _place_steps(self, name: str, run: np.void) -> None:
         """A step of the command lies somewhere in its recording interval: take the instant that fits the angle best."""
         b = self._brought[name]
+        if not len(b.jumps):
+            return
         until = min(len(b.recording.time), int(b.jumps[0, 1]) + max(10, round(0.015 / b.nominal.interval)))
         tick = self.actuator.control_period / float(b.nominal.interval * np.min(np.diff(b.jumps, axis=1)))
+        moments = [*np.arange(EARLIEST, 1.0, max(0.5 * tick, 0.1)), 1.0, None]
+        commands = [self._command(b.recording, b.jumps, moment) for moment in moments]
         tried: list[tuple[float, float | None, np.ndarray]] = []
-        for moment in (*np.arange(EARLIEST, 1.0, max(0.5 * tick, 0.1)), 1.0, None):
-            command = self._command(b.recording, b.jumps, moment)
-            angle = self._simulate(name, run, command, until)["rotor_angle"]
-            tried.append((float(np.sum((angle - b.signals["rotor_angle"][:until]) ** 2)), moment, command))
+        found = self._simulate([_Task(name, run, command) for command in commands], until)
+        for moment, command, signals in zip(moments, commands, found, strict=True):
+            missed = signals["rotor_angle"] - b.signals["rotor_angle"][:until]
+            tried.append((float(np.sum(missed**2)), moment, command))
         least = min(error for error, _, _ in tried)
         # moments within one control tick are the same; the middle one is furthest from the next
         alike = [t for t in tried if t[0] <= least * (1.0 + 1e-9)]
@@ -391,12 +417,12 @@ class ActuatorTwin:
     def covariance(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """Covariance from channel noise, the switching's own scatter and the noise correction's uncertainty."""
         first = all(v == (p.off if p.effect else p.mean) for v, p in zip(values, self.parameters, strict=True))
+        runs = {name: self._runs(values[None, :], name)[0] for name in part}
+        repeats = self._repeats(runs, FIRST_REPEATS if first else JITTER_REPEATS)
 
         def work(name: str) -> np.ndarray:
-            b = self._brought[name]
-            run = self._runs(values[None, :], name)[0]
-            count = FIRST_REPEATS if first else JITTER_REPEATS
-            jitter = self._jitter(name, run, self._shifts(name)[:, :count])
+            b, run = self._brought[name], runs[name]
+            jitter = self._jitter(name, repeats[name])
             b.jitter = np.diag(jitter)
             if b.by_channel is None:
                 b.by_channel = covariance_by_channel(b.nominal, b.signals, b.computed)
@@ -431,15 +457,13 @@ class ActuatorTwin:
     def smooth(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """(statistic,) prediction averaged over where its switching falls."""
 
-        def work(name: str) -> np.ndarray:
-            run = self._runs(values[None, :], name)[0]
-            key = (name, run.tobytes())
-            if key not in self._averages:
-                self._averages[key] = np.mean(self._repeats(name, run, self._shifts(name)), axis=0)
-            return (self._averages[key] + self._offset.get(name, 0.0))[self._brought[name].usable]
-
-        with ThreadPoolExecutor(self.threads) as pool:
-            return np.concatenate(list(pool.map(work, part)))
+        runs = {name: self._runs(values[None, :], name)[0] for name in part}
+        keys = {name: (name, run.tobytes()) for name, run in runs.items()}
+        missing = {name: run for name, run in runs.items() if keys[name] not in self._averages}
+        for name, repeats in self._repeats(missing, JITTER_REPEATS).items():
+            self._averages[keys[name]] = np.mean(repeats, axis=0)
+        averages = {name: self._averages[keys[name]] + self._offset.get(name, 0.0) for name in part}
+        return np.concatenate([averages[name][self._brought[name].usable] for name in part])
 
     def _shifts(self, name: str) -> np.ndarray:
         """(angle, comparator or command, repeat) shifts by which the same physics switches at other instants."""
@@ -448,29 +472,28 @@ class ActuatorTwin:
         scale = np.array([[b.start_scatter], [ripple], [COMMAND_SCATTER]])
         return scale * np.random.default_rng([2, *name.encode()]).standard_normal((3, JITTER_REPEATS))
 
-    def _repeats(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
-        """(repeat, statistic) of simulations of the same physics that switch at other instants."""
-        b = self._brought[name]
-        command, repeats = b.command, []
-        for turn, band, offset in shifts.T:
-            moved = run.copy()
-            moved["theta_0"] += turn
-            moved["hysteresis"] *= 1.0 + band
-            if len(b.jumps):
+    def _repeats(self, runs: Mapping[str, np.void], count: int) -> dict[str, np.ndarray]:
+        """(repeat, statistic) of simulations of the same physics that switch at other instants, by recording."""
+        tasks = []
+        for name, run in runs.items():
+            b = self._brought[name]
+            for turn, band, offset in self._shifts(name)[:, :count].T:
+                moved = run.copy()
+                moved["theta_0"] += turn
+                moved["hysteresis"] *= 1.0 + band
+                if not len(b.jumps):
+                    tasks.append(_Task(name, moved))
+                    continue
                 moment = b.moment
                 if moment is not None:  # it is known to a part of the interval only
                     moment = float(np.clip(moment + MOMENT_SCATTER * offset / COMMAND_SCATTER, EARLIEST, 1.0))
-                command = self._command(b.recording, b.jumps, moment) + offset
-            signals = self._simulate(name, moved, command)
-            if len(b.jumps):
-                signals["commanded_position"] = signals["commanded_position"] + offset
-            repeats.append(self._as_recorded(name, moved, signals))
-        return np.array(repeats)
+                tasks.append(_Task(name, moved, self._command(b.recording, b.jumps, moment) + offset, offset))
+        found = self._statistics(tasks)
+        return {name: np.array(found[n * count : (n + 1) * count]) for n, name in enumerate(runs)}
 
-    def _jitter(self, name: str, run: np.void, shifts: np.ndarray) -> np.ndarray:
+    def _jitter(self, name: str, repeats: np.ndarray) -> np.ndarray:
         """(statistic, statistic) covariance of a single prediction by where its switching falls."""
         b = self._brought[name]
-        repeats = self._repeats(name, run, shifts)
         apart = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
         variance = np.square(apart).sum(axis=0)
         for alike in ALIKE:  # the three phases scatter alike, and few repeats tell a variance poorly

@@ -57,7 +57,7 @@ def _differences(twin: ActuatorTwin, values: np.ndarray, part: Sequence[str]) ->
         noise = {c: max(brought.noise[c], 1e-9) for c in ("voltage", "current", "current_end", "speed")}
         settings = SETTINGS | {"noise": noise}
         run = twin._runs(values[None, :], name)[0]
-        clean = twin._simulate(name, run)
+        clean = twin.simulated(name, [run])[0]
         rng = np.random.default_rng(3)
         simulated = {
             signal: np.stack(

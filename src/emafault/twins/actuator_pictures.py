@@ -62,7 +62,9 @@ def worst_region(diagnosis: Diagnosis) -> Region | None:
         points["after"] = diagnosis.found.candidates[0].point.values
     brought = twin._brought[name]
     runs = {rung: twin._runs(values[None, :], name)[0] for rung, values in points.items()}
-    computed = {rung: compute(brought.nominal, twin._simulate(name, run), keep=True) for rung, run in runs.items()}
+    signals = twin.simulated(name, list(runs.values()))
+    simulated = dict(zip(runs, signals, strict=True))
+    computed = {rung: compute(brought.nominal, simulated[rung], keep=True) for rung in runs}
     row = EQUATIONS.index(worst.equation)
     alike = [m for m, c in enumerate(cells_of(name)) if (c.equation, c.along) == (worst.equation, worst.along)]
     counts = np.any(brought.computed.regressors[alike] != 0.0, axis=0)
@@ -90,7 +92,6 @@ def worst_region(diagnosis: Diagnosis) -> Region | None:
     units, text = _RESIDUAL["electrical" if worst.equation in PHASE_EQUATIONS else worst.equation]
     gap = brought.computed.residual[row] - computed["recalibrated"].residual[row]
     stretch = _stretch(gap * counts, brought.nominal.interval, theta)
-    simulated = {rung: twin._simulate(name, run) for rung, run in runs.items()}
     traces = {
         label_: {
             "measured": pick(brought.signals)[stretch],
