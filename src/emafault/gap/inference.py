@@ -212,8 +212,8 @@ class Problem(Gaussian):
         free = [*self.nuisances, *own]
         jacobian = candidate.point.jacobian.copy()
         jacobian[:, : len(self.nuisances)] = null.jacobian
-        both = (candidate.point.values, candidate.start)
-        starts = [self.point(v, self.predict(v)[0], jacobian, free, widened) for v in both]
+        both = np.array([candidate.point.values, candidate.start])
+        starts = [self.point(v, y, jacobian, free, widened) for v, y in zip(both, self.predict(both), strict=True)]
         best = min(starts, key=lambda point: point.objective)
         for round_ in range(rounds):
             if own and renew and round_ in (0, 2):

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..actuator.commands import command_positions
 from ..actuator.fixed_step import quantise_by_truncation, simulate_fixed_step
-from ..actuator.parameters import ActuatorParameters, make_runs
+from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise, measure
-from ..actuator.simulate import simulate, time_axis
+from ..actuator.simulate import time_axis
 from ..effects import EFFECTS
 from ..recording import Recording, replace_atomically, write_recording
 from .cases import RUNGS, Case, case_from_dict, draw_case
 from .detectability import Detector
+from .statistics import runs_of, simulate_plans
 
 STEP = 2e-6  # s, of the other integrator
 
@@ -63,16 +63,14 @@ def simulate_truth(
 
     ``step`` (s) lets every case run on it, ``sampled`` with events at the steps only (see ``simulate_fixed_step``).
     """
+    if not case.forms and step is None:
+        states = [(case.unit(), np.array(plan.fault)) for plan in case.recordings]
+        return simulate_plans(actuator, case.recordings, states)
     out = []
     for plan in case.recordings:
-        runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
-        command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
-        if case.forms or step is not None:
-            timing = plan.duration, plan.interval, step or STEP
-            signals = simulate_fixed_step(runs, command, *timing, case.forms, sampled)
-        else:
-            signals = simulate(runs, command, plan.duration, plan.interval)
-        out.append(signals)
+        runs, command = runs_of(actuator, plan, [case.unit()], np.array([plan.fault]))
+        timing = plan.duration, plan.interval, step or STEP
+        out.append(simulate_fixed_step(runs, command, *timing, case.forms, sampled))
     return out
 
 
@@ -88,7 +86,7 @@ def write_bench(
     truth = simulate_truth(case, actuator, step, sampled)
     scaled = SensorNoise(**{k: v * case.noise_scale.get(k, 1.0) for k, v in asdict(noise).items()})
     for n, (plan, signals) in enumerate(zip(case.recordings, truth)):
-        runs = make_runs(actuator, np.array([plan.fault]), effects=case.unit(), theta_0=plan.theta_0)
+        runs, _ = runs_of(actuator, plan, [case.unit()], np.array([plan.fault]))
         truncate = "speed_quantisation" in case.forms
         step = float(runs["speed_quantisation_step"][0])
         if truncate:

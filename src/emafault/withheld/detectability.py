@@ -14,7 +14,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..effects import EFFECTS
 from .cases import Case
-from .statistics import Unit, View, coarser, less, simulate_plan
+from .statistics import Unit, View, coarser, less, simulate_plan, simulate_plans
 
 LATTICE = 1e6  # squared distance by which rounded values differ from unrounded ones: one look at them tells
 PLAIN = 1e6  # above it a squared distance to the nominal model is not refined
@@ -157,12 +157,13 @@ class Detector:
     def shift(self, x: np.ndarray | None, effects: Unit) -> np.ndarray:
         """Whitened shift of all statistics from the base, (statistic,)."""
         x = np.zeros(len(self.prior)) if x is None else x
-        out = []
-        for m, (view, base) in enumerate(zip(self.views, self.base)):
-            unit, fault = self._state(m, x, effects)
-            signals = simulate_plan(self.actuator, view.plan, [unit], fault[None])
-            out.append(view.whiten(less(view.statistics(signals), base))[0])
-        return np.concatenate(out)
+        states = [self._state(m, x, effects) for m in range(len(self.views))]
+        simulated = simulate_plans(self.actuator, [view.plan for view in self.views], states)
+        shifts = [
+            view.whiten(less(view.statistics(signals), base))[0]
+            for view, base, signals in zip(self.views, self.base, simulated)
+        ]
+        return np.concatenate(shifts)
 
     def squared(self, shift: np.ndarray) -> float:
         """Squared length of a whitened shift, nuisances marginalised to first order."""

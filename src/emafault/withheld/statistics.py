@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from ..actuator.commands import command_positions
 from ..actuator.parameters import ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
-from ..actuator.simulate import simulate
+from ..actuator.simulate import commanded_position, simulate, simulate_each, time_axis
 from ..effects import EFFECTS
 from .cases import Case, RecordingPlan
 
@@ -38,14 +38,38 @@ def simulate_plan(
     band: np.ndarray | float = 1.0,
 ) -> dict[str, np.ndarray]:
     """Simulate one recording for a batch of units and (run, 6) faults, noise-free; ``band`` scales the hysteresis."""
-    runs = make_runs(actuator, faults, theta_0=plan.theta_0)
+    runs, command = runs_of(actuator, plan, units, faults)
     runs["hysteresis"] *= band
+    return simulate(runs, command, plan.duration, plan.interval)
+
+
+def simulate_plans(
+    actuator: ActuatorParameters, plans: Sequence[RecordingPlan], states: Sequence[tuple[Unit, np.ndarray]]
+) -> list[dict[str, np.ndarray]]:
+    """Simulate every recording once, noise-free, each for its own unit and (6,) fault; signals with a run axis of 1."""
+    made = [runs_of(actuator, plan, [unit], fault[None]) for plan, (unit, fault) in zip(plans, states)]
+    records = [len(time_axis(plan.duration, plan.interval)) for plan in plans]
+    found = simulate_each(
+        np.concatenate([runs for runs, _ in made]), [c for _, c in made], [plan.interval for plan in plans], records
+    )
+    out = []
+    for plan, (_, command), signals in zip(plans, made, found):
+        time = time_axis(plan.duration, plan.interval)
+        signals["commanded_position"] = commanded_position(command, actuator.control_period, time)
+        out.append({name: values[None] for name, values in signals.items()})
+    return out
+
+
+def runs_of(
+    actuator: ActuatorParameters, plan: RecordingPlan, units: Sequence[Unit], faults: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Records of RUN_DTYPE of a recording for a batch of units and (run, 6) faults, and its command (tick+1,), rad."""
+    runs = make_runs(actuator, faults, theta_0=plan.theta_0)
     for row, unit in enumerate(units):
         for effect, values in unit.items():
             for name, value in values.items():
                 runs[EFFECTS[effect].field(name)][row] = value
-    command = command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
-    return simulate(runs, command, plan.duration, plan.interval)
+    return runs, command_positions(plan.command, plan.settings, plan.duration, actuator.control_period)
 
 
 def trapezoid(x: np.ndarray) -> np.ndarray:
