@@ -5,7 +5,7 @@ lanes in one instruction what would else keep it waiting for one result after th
 other.
 """
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 
 NEVER = 1.0e30
 LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment
@@ -85,7 +85,7 @@ def _segment_of(extras: bool):
     A lane without them comes out the same by either, bit for bit.
     """
 
-    @compiled
+    @compiled_inline
     def segment(x, lanes):
         # without branches, conditional loads or stores: only then the compiler puts the lanes into one instruction
         for n in range(lanes):
@@ -189,7 +189,7 @@ def _segment_of(extras: bool):
 _segment, _whole_segment = _segment_of(False), _segment_of(True)
 
 
-@compiled
+@compiled_inline
 def conduct(x, lanes, extras):
     """Two phases in series on the supply, switched by the comparator, in every lane until something else happens.
 

@@ -58,7 +58,7 @@ def record_interval(p, s, interval, voltage, current, current_end, speed, angle,
     s.record = record + 1
 
 
-@compiled
+@compiled_inline
 def control_tick(p, s, commanded):
     """Take the demanded current from the commanded user-shaft angle (rad), and the resistances of a heating winding."""
     measured = s.filtered if p.speed_latency_tau > 0.0 else p.speed_scale_scale * s.w
@@ -85,7 +85,7 @@ def control_tick(p, s, commanded):
     s.tick += 1
 
 
-@compiled
+@compiled_inline
 def next_instant(p, s, interval):
     """The next control tick, recording instant or arrival of a delayed demand (s); takes a demand that is due."""
     ends_at = min(s.tick * p.control_period, (s.record + 1) * interval)

@@ -9,7 +9,7 @@ integrals of the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be st
 
 import numpy as np
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .conduction import (
     BUS_FILTER,
     CURRENT_TOLERANCE,
@@ -38,7 +38,7 @@ def mean_square(start, end, mean):
     return (start * start + 4.0 * middle * middle + end * end) / 6.0
 
 
-@compiled
+@compiled_inline
 def segment(p, s, ends_at):
     """Take a run on to its next event, or where only events will do on to ``ends_at`` (s).
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .compiled import compiled
+from .compiled import compiled_inline
 from .conduction import (
     ANGLE,
     AREA,
@@ -48,7 +48,7 @@ SLOW_FRICTION = 0.1  # of Stribeck's speed, over which his friction is a straigh
 SHORTEST_CHUNK = 1.0e-5  # s
 
 
-@compiled
+@compiled_inline
 def hand_over(p, s, x, lane, ends_at):
     """Put a run into its lane until ``ends_at`` (s) at most; returns whether nothing but its comparator will switch.
 
@@ -136,7 +136,7 @@ def hand_over(p, s, x, lane, ends_at):
     return True
 
 
-@compiled
+@compiled_inline
 def take_back(p, s, x, lane):
     """Take over what was conducted in a run's lane; arguments as those of ``hand_over``."""
     s.conducting = False

@@ -6,6 +6,7 @@ fields by name. The field of parameter ``a`` of effect ``stribeck`` is ``stribec
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -89,12 +90,7 @@ def make_runs(
     InputError : an unknown effect, parameter or eccentricity law
     """
     faults = np.atleast_2d(np.asarray(faults, float))
-    runs = np.zeros(len(faults), RUN_DTYPE)
-    for f in fields(actuator):
-        runs[f.name] = getattr(actuator, f.name)
-    for effect in EFFECTS.values():
-        for name, parameter in effect.parameters.items():
-            runs[effect.field(name)] = getattr(actuator, parameter.follows) if parameter.follows else parameter.nominal
+    runs = np.repeat(_nominal_run(actuator), len(faults))
     runs["shorted_turns"], runs["eccentricity"], runs["dT"] = faults[:, :3], faults[:, 3:5], faults[:, 5]
     runs["dT_magnet"] = faults[:, 5] if dT_magnet is None else dT_magnet
     if eccentricity_law not in ECCENTRICITY_LAWS:
@@ -103,6 +99,18 @@ def make_runs(
     runs["theta_0"] = theta_0
     set_effects(runs, effects or {})
     return runs
+
+
+@lru_cache(maxsize=16)
+def _nominal_run(actuator: ActuatorParameters) -> np.ndarray:
+    """(1,) record of an actuator with every effect off."""
+    run = np.zeros(1, RUN_DTYPE)
+    for f in fields(actuator):
+        run[f.name] = getattr(actuator, f.name)
+    for effect in EFFECTS.values():
+        for name, parameter in effect.parameters.items():
+            run[effect.field(name)] = getattr(actuator, parameter.follows) if parameter.follows else parameter.nominal
+    return run
 
 
 def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, Any]]) -> None:

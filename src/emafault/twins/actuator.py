@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..actuator.commands import jumps_of, resample, with_corners
 from ..actuator.conduction import LANES
-from ..actuator.parameters import ActuatorParameters, make_runs
+from ..actuator.parameters import RUN_DTYPE, ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
 from ..actuator.simulate import simulate_each
 from ..effects import EFFECTS
@@ -99,6 +99,7 @@ class _Brought:
     moment: float | None = None  # at which a step of the command came, from the sample before it to that after
     variances: dict[str, float] = field(default_factory=dict)  # of this recording's channels, as last compared
     by_channel: dict[str, np.ndarray] | None = None  # covariance of the statistics under unit noise
+    unit_noise: list[dict[str, np.ndarray]] = field(default_factory=list)  # draws by channel, as often as they serve
     jitter: np.ndarray | None = None  # (statistic,) variance from where the switching falls
     start_scatter: float = START_SCATTER[1]  # rad
 
@@ -281,7 +282,9 @@ class ActuatorTwin:
         brought = [self._brought[t.name] for t in tasks]
         records = [samples or len(b.recording.time) for b in brought]
         commands = [b.command if t.command is None else t.command for t, b in zip(tasks, brought, strict=True)]
-        runs = np.array([t.run for t in tasks])
+        runs = np.empty(len(tasks), RUN_DTYPE)
+        for n, t in enumerate(tasks):
+            runs[n] = t.run
         out = simulate_each(runs, commands, [b.nominal.interval for b in brought], records)
         for signals, b, t, n in zip(out, brought, tasks, records, strict=True):
             signals["commanded_position"] = b.signals["commanded_position"][:n] + t.offset
@@ -403,11 +406,14 @@ class ActuatorTwin:
     def _correct_bias(self, name: str, clean: dict) -> None:
         """Mean shift of the statistics by noise in their regressors."""
         b = self._brought[name]
-        rng = np.random.default_rng(1)
+        if not b.unit_noise:
+            rng = np.random.default_rng(1)
+            for _ in range(NOISE_PAIRS):
+                b.unit_noise.append({c: rng.standard_normal(clean[s].shape) for c, s in CHANNELS.items()})
         still = self._compared(name, clean)
         total = np.zeros(SIZE)
-        for _ in range(NOISE_PAIRS):
-            drawn = {s: b.noise[c] * rng.standard_normal(clean[s].shape) for c, s in CHANNELS.items()}
+        for unit in b.unit_noise:
+            drawn = {s: b.noise[c] * unit[c] for c, s in CHANNELS.items()}
             for sign in (1.0, -1.0):  # what is linear in the noise cancels: the bias is not
                 noisy = clean | {signal: clean[signal] + sign * noise for signal, noise in drawn.items()}
                 total += self._compared(name, noisy)
