@@ -20,6 +20,7 @@ from emafault.actuator.commands import command_positions
 from emafault.actuator.compiled import OPTIONS
 from emafault.actuator.conduction import LANES
 from emafault.actuator.parameters import make_runs
+from emafault.actuator.state import RUN_STATE
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 
@@ -55,12 +56,13 @@ def main() -> None:
     engines = [kernel.run_batch, names["run_batch"]]
     shape = LANES, records
     outs = [[np.zeros((*shape, 3)) for _ in range(3)] + [np.zeros(shape) for _ in range(4)] for _ in engines]
+    state = np.zeros(LANES, RUN_STATE)
     timing = np.full(LANES, interval), np.full(LANES, records)
     best = [np.inf, np.inf]
     for n in range(repeats + 1):
         for e, engine in enumerate(engines):
             start = time.process_time()
-            engine(runs, np.arange(LANES), command, *timing, *outs[e])
+            engine(state, runs, np.arange(LANES), command, *timing, *outs[e])
             if n:  # the first call compiles
                 best[e] = min(best[e], (time.process_time() - start) / LANES)
     # the compiler contracts and reorders a + b c by what is left of an expression, so the last bit may differ

@@ -1,5 +1,9 @@
 """The event-driven simulation: check figures, exactness, and physics that can be worked out by hand."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -72,6 +76,31 @@ def test_each_run_is_the_same_among_runs_of_other_lengths_commands_and_effects()
         assert np.abs(alone["rotor_speed"]).max() > 10.0
         for name, values in alone.items():
             assert np.array_equal(values, together[n][name]), (n, name)
+
+
+UNCOMPILED = """
+import sys, numpy as np
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.simulate import simulate
+from emafault.config import reference_actuator
+actuator = reference_actuator()
+command = command_positions("step", {"amplitude": 0.02, "time": 0.0005}, 0.004, actuator.control_period)
+runs = make_runs(actuator, np.zeros((2, 6)), effects={"compliance": {"K": np.array([0.0, 8000.0])}})
+np.savez(sys.argv[1], **simulate(runs, command, 0.004, 2e-4))
+"""
+
+
+def test_it_also_runs_uncompiled(tmp_path):
+    found = {}
+    for flag in ("0", "1"):
+        environment = os.environ | {"NUMBA_DISABLE_JIT": flag}
+        path = tmp_path / f"{flag}.npz"
+        subprocess.run([sys.executable, "-W", "ignore", "-c", UNCOMPILED, path], env=environment, check=True)
+        found[flag] = np.load(path)
+    assert np.abs(found["0"]["phase_current"]).max() > 1.0
+    for name in found["0"]:
+        assert np.allclose(found["0"][name], found["1"][name], rtol=1e-9, atol=1e-9), name
 
 
 @pytest.mark.parametrize("fault", [HEALTHY, FAULT])

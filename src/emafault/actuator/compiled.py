@@ -24,8 +24,14 @@ _ROOT = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "emafault" / source_digest()))
 
 import numba  # noqa: E402
+import numpy as np  # noqa: E402
 
 numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]  # type: ignore[attr-defined]
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 compiled = numba.njit(cache=True, **OPTIONS)
 compiled_inline = numba.njit(cache=True, forceinline=True, **OPTIONS)  # into its one caller, whose arrays it takes
+
+
+def attributed(records: np.ndarray) -> np.ndarray:
+    """Structured array whose records have their fields as attributes, which compiled code gives them anyway."""
+    return records.view(np.recarray) if numba.config.DISABLE_JIT else records  # type: ignore[attr-defined]

@@ -25,7 +25,7 @@ from .friction import sliding_torque
 from .instants import SAME, control_tick, lagging, next_instant, record_interval
 from .lane import hand_over, take_back
 from .motor import TWO_PI, modulate
-from .state import COGGING_ORDER, FLOATING, RUN_STATE, begin
+from .state import COGGING_ORDER, FLOATING, begin
 
 STALLED = 1000  # segments without progress in time, after which a run is given up
 SHAFT_DAMPING = 2.0  # N m s/rad to ground, at the user shaft of the compliant transmission
@@ -383,11 +383,14 @@ def segment(p, s, ends_at):
 
 
 @compiled
-def run_batch(runs, rows, command, interval, records, voltage, current, current_end, speed, angle, position, bus):
+def run_batch(
+    state, runs, rows, command, interval, records, voltage, current, current_end, speed, angle, position, bus
+):
     """Simulate runs and fill their recorded signals.
 
     Parameters
     ----------
+    state : (lane,) records of RUN_STATE to work in, ``LANES`` at most
     runs : (run,) records of RUN_DTYPE
     rows : (n,) which of them; best those with extras (see ``has_extras``) apart from those without
     command : (run or 1, tick+1) commanded user-shaft angle at the control ticks (rad)
@@ -395,8 +398,7 @@ def run_batch(runs, rows, command, interval, records, voltage, current, current_
     voltage, current, current_end : (run, time, phase) outputs (V, A, A)
     speed, angle, position, bus : (run, time) outputs (rad/s, rad, rad, V)
     """
-    lanes = LANES if len(rows) > 1 else len(rows)  # one alone goes faster without seven empty lanes
-    x, state = np.zeros(ROWS * LANES), np.zeros(lanes, RUN_STATE)
+    lanes, x = len(state), np.zeros(ROWS * LANES)
     begun = going = min(lanes, len(rows))
     for lane in range(lanes):
         state[lane].row = -1

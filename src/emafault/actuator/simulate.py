@@ -6,9 +6,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..errors import InputError
+from .compiled import attributed
 from .conduction import LANES
 from .kernel import run_batch
-from .state import has_extras
+from .state import RUN_STATE, has_extras
 
 PHASE_SIGNALS = ("phase_voltage", "phase_current", "phase_current_end")
 SIGNALS = (*PHASE_SIGNALS, "rotor_speed", "rotor_angle", "output_position", "bus_voltage")
@@ -88,14 +89,16 @@ def _run(
     # as the simulation
     pieces = np.split(np.empty(ends[-1]), ends[:-1])
     out = {name: piece.reshape(s) for name, piece, s in zip(SIGNALS, pieces, shapes, strict=True)}
-    extras = np.array([has_extras(run) for run in runs])
+    given = attributed(runs)
+    extras = np.array([has_extras(run) for run in given])
     parts = []
     for alike in (np.flatnonzero(~extras), np.flatnonzero(extras)):
         shares = min(4 * threads, -(-len(alike) // LANES)) if threads > 1 else 1
         parts += [rows for rows in np.array_split(alike, max(1, shares)) if len(rows)]
 
     def part(rows: np.ndarray) -> None:
-        run_batch(runs, rows, command, interval, records, *(out[name] for name in SIGNALS))
+        state = attributed(np.zeros(LANES if len(rows) > 1 else 1, RUN_STATE))  # one alone goes faster by itself
+        run_batch(state, given, rows, command, interval, records, *(out[name] for name in SIGNALS))
 
     if threads <= 1 or len(parts) < 2:
         for rows in parts:
