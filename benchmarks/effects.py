@@ -25,7 +25,7 @@ from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 
 LIMIT = 1.2
-ROUNDING = 1e-11  # differences above this, a last bit carried on by the switching loop, would be another physics
+ROUNDING = 1e-13  # differences above this would be another physics
 
 
 def specialised() -> tuple[dict, int]:
