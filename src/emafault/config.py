@@ -333,18 +333,25 @@ def _withheld_draw(draw: str) -> dict[str, Any]:
     return OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore[return-value]
 
 
+def _of_rung(value: Any, rung: str) -> int:
+    """A number of a draw that is one for all its rungs or one for each."""
+    return value[rung] if isinstance(value, dict) else value
+
+
 def withheld_jobs(draw: str) -> list[tuple[str, int]]:
     """(rung, batch) of every job of a draw."""
     read = _withheld_draw(draw)
-    return [(rung, n) for rung, cases in read["cases"].items() for n in range(-(-cases // read["batch"]))]
+    return [
+        (rung, n) for rung, cases in read["cases"].items() for n in range(-(-cases // _of_rung(read["batch"], rung)))
+    ]
 
 
 def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
     """What one job of blind cases reads: its seeds, the actuator and the sensors."""
     read = _withheld_draw(draw)
-    origin = read["first_seed"][rung] if isinstance(read["first_seed"], dict) else read["first_seed"]
-    first = origin + batch * read["batch"]
-    last = min(first + read["batch"], origin + read["cases"][rung])
+    origin, size = _of_rung(read["first_seed"], rung), _of_rung(read["batch"], rung)
+    first = origin + batch * size
+    last = min(first + size, origin + read["cases"][rung])
     config = compose()
     seeds = {"rung": rung, "first": first, "last": last}
     return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})

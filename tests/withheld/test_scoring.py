@@ -152,6 +152,7 @@ def test_score_of_a_folder(tmp_path, monkeypatch):
             (tmp_path / "diagnoses" / name).mkdir(parents=True)
             (tmp_path / "diagnoses" / name / "diagnosis.json").write_text(json.dumps(verdict))
     scores = score(tmp_path)
+    assert score(tmp_path, processes=2) == scores
     assert scores["missing"] == ["t4_1"]
     metrics = {m["id"]: m for m in scores["metrics"]}
     expected = {

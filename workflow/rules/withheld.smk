@@ -32,6 +32,7 @@ rule score_cases:
         scores=f"{WITHHELD}/{{draw}}/scores.json",
     log:
         f"{RESULTS}/logs/withheld/{{draw}}/score_cases.log",
+    threads: 8
     resources:
         mem_mb=2000,
         runtime=20,

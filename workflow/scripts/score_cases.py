@@ -8,4 +8,5 @@ from emafault.study.scored import score_draw
 with one_line_errors(snakemake.log[0]):
     files = [Path(path) for path in snakemake.input.batches]
     given, out = snakemake.input, snakemake.output
-    score_draw(files, Path(given.measured), Path(out.report), Path(out.scores), given.where[0])
+    places = Path(given.measured), Path(out.report), Path(out.scores)
+    score_draw(files, *places, given.where[0], snakemake.threads)

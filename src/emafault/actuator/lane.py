@@ -49,6 +49,31 @@ SHORTEST_CHUNK = 1.0e-5  # s
 
 
 @compiled_inline
+def stays_off(p, s, plus, minus, off, w, gone, current):
+    """Whether a floating terminal surely stays between the rails, and so carries no current.
+
+    From the mean of the rails it is at most as far as its own back-EMF from that of the star point, which the two
+    conducting phases divide by their inductances (``segment`` looks at the same voltage as it is).
+
+    Parameters
+    ----------
+    p, s : records of RUN_DTYPE and RUN_STATE
+    plus, minus, off : the phases by their role
+    w, gone, current : largest speed (rad/s), angle (rad) and current (A) until something else happens
+    """
+    if s.sagging or p.inductance_saturation_s != 0.0:
+        return False
+    K, dK, L, R = s.K, s.dK, s.L, s.R
+    share = L[minus] * s.inverse_L_pair[off]
+    rest = 1.0 - share
+    now = K[off] - share * K[plus] - rest * K[minus]
+    then = now + gone * (dK[off] - share * dK[plus] - rest * dK[minus])
+    resistive = abs(share * (R[plus] + p.switch_resistance) - rest * (R[minus] + p.switch_resistance)) * current
+    farthest = abs(share - 0.5) * p.bus_voltage_Vdc + max(abs(now), abs(then)) * w + resistive
+    return farthest < 0.5 * p.bus_voltage_Vdc + p.diode_voltage
+
+
+@compiled_inline
 def hand_over(p, s, x, lane, ends_at):
     """Put a run into its lane until ``ends_at`` (s) at most; returns whether nothing but its comparator will switch.
 
@@ -65,7 +90,7 @@ def hand_over(p, s, x, lane, ends_at):
     i, pair, cell, theta, w, moving = s.i, s.pair, s.cell, s.theta, s.w, s.moving
     plus, minus = pair[cell, 0], pair[cell, 1]
     off = 3 - plus - minus
-    if i[off] != 0.0 or abs(w) >= s.slow or abs(theta - p.theta_0) >= s.free_travel:
+    if i[off] != 0.0 or abs(theta - p.theta_0) >= s.free_travel:
         return False
     # ---- back-EMF coefficients and how far they are a short series
     poles, edge, value, slope = p.pole_pairs, s.edge, s.value, s.slope
@@ -114,6 +139,13 @@ def hand_over(p, s, x, lane, ends_at):
         high = False
     elif not high and i[plus] <= centre - width + CURRENT_TOLERANCE:
         high = True
+    if abs(w) >= s.slow:
+        current = max(abs(i[plus]), abs(centre) + width)
+        drive = current * (abs(K[plus]) + abs(K[minus])) + abs(torque) + damping * abs(w)
+        fastest = abs(w) + drive * s.inverse_inertia * duration
+        gone = moving * min(fastest * duration, (upper - edge[cell] - into if moving > 0 else into) / poles)
+        if not stays_off(p, s, plus, minus, off, fastest, gone, current):
+            return False
     s.high = high
     x[I + lane], x[SPEED + lane], x[SIGN + lane] = i[plus], w, 1.0 if high else -1.0
     x[TIME + lane] = x[ANGLE + lane] = x[AREA + lane] = x[TRIP + lane] = 0.0

@@ -90,7 +90,8 @@ def _run(
     pieces = np.split(np.empty(ends[-1]), ends[:-1])
     out = {name: piece.reshape(s) for name, piece, s in zip(SIGNALS, pieces, shapes, strict=True)}
     given = attributed(runs)
-    extras = np.array([has_extras(run) for run in given])
+    # extras hold up the lanes beside them, but less than lanes left empty
+    extras = np.array([has_extras(run) for run in given]) & (len(runs) > LANES)
     parts = []
     for alike in (np.flatnonzero(~extras), np.flatnonzero(extras)):
         shares = min(4 * threads, -(-len(alike) // LANES)) if threads > 1 else 1

@@ -9,7 +9,9 @@ from ..withheld.scoreboard import write_scoreboard
 from ..withheld.scoring import score
 
 
-def score_draw(batches: Sequence[Path], measured: Path, report: Path, scores: Path, where: str) -> None:
+def score_draw(
+    batches: Sequence[Path], measured: Path, report: Path, scores: Path, where: str, processes: int = 1
+) -> None:
     """Score the cases of a draw: page, figures and ``scores.json`` beside ``report``, and one MLflow run.
 
     Parameters
@@ -17,13 +19,14 @@ def score_draw(batches: Sequence[Path], measured: Path, report: Path, scores: Pa
     batches : what the jobs of the draw have written
     measured : rows of the check by known changes of measured recordings, the rung T6
     where : what ``prepare_tracking`` has written
+    processes : over so many the cases are shared out
 
     Raises
     ------
     InputError : a verdict that cannot be read, or a tracking server that cannot be used
     """
     folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    found = score(folder) | {"measured": json.loads(measured.read_text())}
+    found = score(folder, processes=processes) | {"measured": json.loads(measured.read_text())}
     page = write_scoreboard(found, report.parent)
     if page != report:
         page.replace(report)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -183,11 +184,11 @@ METRICS = (
 )
 
 
-def score(folder: str | Path, seed: int = 0) -> dict:
+def score(folder: str | Path, seed: int = 0, processes: int = 1) -> dict:
     """Score what a folder holds: ``keys/NAME.json`` against ``diagnoses/NAME/diagnosis.json``.
 
     ``oracles/NAME/diagnosis.json``, where present, is a diagnosis that was told the effect; else the best possible
-    error of the key stands for the oracle.
+    error of the key stands for the oracle. Over so many ``processes`` the cases are shared out.
 
     Returns
     -------
@@ -198,18 +199,24 @@ def score(folder: str | Path, seed: int = 0) -> dict:
     ------
     InputError : a verdict file that cannot be read
     """
-    folder = Path(folder)
-    rows, missing = [], []
-    for path in sorted((folder / "keys").glob("*.json")):
-        verdict = folder / "diagnoses" / path.stem / "diagnosis.json"
-        if not verdict.exists():
-            missing.append(path.stem)
-            continue
-        oracle = folder / "oracles" / path.stem / "diagnosis.json"
-        told = read_verdict(oracle) if oracle.exists() else None
-        row = judge(json.loads(path.read_text()), read_verdict(verdict), told)
-        rows.append(row | {"name": path.stem})
-    return score_rows(rows, seed) | {"missing": missing}
+    keys = sorted((Path(folder) / "keys").glob("*.json"))
+    if processes > 1:
+        with ProcessPoolExecutor(processes) as pool:
+            judged = list(pool.map(_judged, keys))
+    else:
+        judged = [_judged(key) for key in keys]
+    missing = [key.stem for key, row in zip(keys, judged, strict=True) if row is None]
+    return score_rows([row for row in judged if row is not None], seed) | {"missing": missing}
+
+
+def _judged(key: Path) -> dict | None:
+    """Row of one case, from the path of its key; None where it has no verdict."""
+    folder = key.parent.parent
+    verdict, oracle = (folder / kind / key.stem / "diagnosis.json" for kind in ("diagnoses", "oracles"))
+    if not verdict.exists():
+        return None
+    told = read_verdict(oracle) if oracle.exists() else None
+    return judge(json.loads(key.read_text()), read_verdict(verdict), told) | {"name": key.stem}
 
 
 def score_rows(rows: Rows, seed: int = 0) -> dict:
