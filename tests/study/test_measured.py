@@ -1,38 +1,48 @@
 """Verdict files and the page of measured machines."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
+import yaml
 
 from emafault.errors import InputError
-from emafault.study.measured import diagnose_file, file_name, summary
+from emafault.study.measured import diagnose_sets, file_name, summary
 
 DATA = Path(__file__).parents[2] / "data" / "measured"
 
 
-def test_a_file_gets_its_verdict_and_page(tmp_path):
-    diagnose_file(DATA / "emps" / "emps_estimation.npz", "friction_axis", tmp_path)
-    verdict = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert verdict["verdict"] in ("explained", "group", "partly", "unknown", "no_gap")
-    assert {"bench", "recordings", "where", "which", "groups", "shrinks", "held_out", "notes"} <= set(verdict)
-    page = (tmp_path / "report.html").read_text()
-    assert "emps_estimation" in page and page.count("<img") == 2
+def diagnosed(folder: Path, sets: list[dict]) -> Path:
+    """Folder of what ``diagnose_sets`` writes of a list of sets."""
+    listed, out = folder / "sets.yaml", folder / "out"
+    for entry in sets:
+        shutil.copytree(DATA / entry["folder"], folder / entry["folder"])
+    shutil.copy(DATA / "nameplate.yaml", folder)
+    listed.write_text(yaml.safe_dump(sets))
+    diagnose_sets(listed, out / "report.html", out / "figures", out / "verdicts.json", out / "withheld.json")
+    return out
 
 
-def test_a_file_of_several_machines_gets_a_folder_for_each(tmp_path):
-    found = diagnose_file(DATA / "odrive_cogging", "slow_rotation", tmp_path)
-    top = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert set(top["cases"]) == set(found) == {"cogging_maps", "slow_moves"}
-    for case in found:
-        assert json.loads((tmp_path / case / "diagnosis.json").read_text()) == top["cases"][case]
-        line = summary(case, top["cases"][case])
-        assert line[0] == case and all(isinstance(cell, str) for cell in line)
+def test_every_case_of_a_set_gets_its_verdict_and_its_place_on_the_page(tmp_path):
+    files = ["cogging_maps.npz", "slow_moves.npz"]
+    out = diagnosed(tmp_path, [{"folder": "odrive_cogging", "twin": "slow_rotation", "files": files}])
+    verdicts = json.loads((out / "verdicts.json").read_text())
+    assert list(verdicts) == [f"odrive_cogging/{file}" for file in files]
+    page = (out / "report.html").read_text()
+    for cases in verdicts.values():
+        for case, verdict in cases.items():
+            assert verdict["verdict"] in ("explained", "group", "partly", "unknown", "no_gap")
+            assert {"recordings", "where", "which", "groups", "shrinks", "held_out", "notes"} <= set(verdict)
+            line = summary(case, verdict)
+            assert line[0] == case and all(isinstance(cell, str) for cell in line) and case in page
+    rows = json.loads((out / "withheld.json").read_text())
+    assert {row["twin"] for row in rows} == {"slow_rotation"} and page.count("<img") >= 4
 
 
 def test_a_wrong_file_writes_nothing(tmp_path):
-    with pytest.raises(InputError):
-        diagnose_file(DATA / "emps" / "emps_estimation.npz", "back_emf", tmp_path / "out")
+    with pytest.raises(InputError, match="emps_estimation"):
+        diagnosed(tmp_path, [{"folder": "emps", "twin": "back_emf", "files": ["emps_estimation.npz"]}])
     assert not (tmp_path / "out").exists()
 
 

@@ -5,17 +5,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from emafault.gap.decide import UNCALIBRATED, Calibration
 from emafault.gap.held_out import shared
 from emafault.twins.diagnosed import check_file, diagnose_cases
-from emafault.twins.library import MEASURED
+from emafault.twins.library import MEASURED, calibration_of
 
 from .test_measured import DATA, FILES
 
 
 @cache
 def diagnosed(name: str, number: int = 0):
-    return diagnose_cases(name, DATA / FILES[name][number], Calibration.load(UNCALIBRATED))
+    return diagnose_cases(name, DATA / FILES[name][number], calibration_of(name))
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -59,7 +58,7 @@ def test_what_sets_share():
 
 
 def test_the_withheld_check_names_distortions_and_refuses_what_it_lacks():
-    rows = [row for name in MEASURED for row in check_file(name, DATA / FILES[name][0], Calibration.load(UNCALIBRATED))]
+    rows = [row for name in MEASURED for row in check_file(name, DATA / FILES[name][0], calibration_of(name))]
     named = [row for row in rows if row.expected]
     refused = [row for row in rows if not row.expected]
     assert len(named) >= 12 and len(refused) >= 10

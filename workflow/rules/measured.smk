@@ -27,6 +27,32 @@ rule diagnose_measured:
         "../scripts/diagnose_measured.py"
 
 
+rule calibrate_measured:
+    input:
+        sets=rules.diagnose_measured.input.sets,
+        files=rules.diagnose_measured.input.files,
+    output:
+        calibrations=directory(f"{RESULTS}/measured/calibrations"),
+        check=f"{RESULTS}/measured/calibration_check.json",
+    log:
+        f"{RESULTS}/logs/measured/calibrate_measured.log",
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        draws=60,
+        seed=1,
+        code=code("calibrate_measured"),
+    script:
+        "../scripts/calibrate_measured.py"
+
+
+rule measured_calibration:
+    """Calibrate what is believed of measured machines anew."""
+    input:
+        rules.calibrate_measured.output.calibrations,
+
+
 rule measured:
     """Diagnose the measured machines."""
     input:

@@ -20,7 +20,7 @@ from .twin import Hypothesis
 from .which import Search, far_outside, groups, left_where_acting
 
 DEFAULT = Path(__file__).with_name("calibration.json")
-#: the prior of a calibration, and what machines without blind cases of their own are judged by
+#: the prior of a calibration
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
 MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more

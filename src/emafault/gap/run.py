@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..progress import say
 from ..recording import Recording, replace_atomically
 from .bench import Bench, read_bench, split_bench
-from .decide import UNCALIBRATED, Calibration
+from .decide import Calibration
 from .diagnose import Diagnosis, diagnose
 from .words import summary
 
@@ -192,10 +192,11 @@ def diagnose_measured(path: Path, twin: str, exclude: Sequence[str] = ()) -> dic
     InputError : a twin, file or effect that cannot be used
     """
     from ..twins.diagnosed import diagnose_cases
+    from ..twins.library import calibration_of
 
     if exclude:
         raise InputError("--exclude: effects can be left out of the actuator's library only")
-    cases = diagnose_cases(twin, path, Calibration.load(UNCALIBRATED))
+    cases = diagnose_cases(twin, path, calibration_of(twin))
     for found in cases.values():
         found.verdict.setdefault("warnings", [])
     return {case: Diagnosed(found, {}) for case, found in cases.items()}

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
@@ -21,14 +20,10 @@ from ..gap.run import diagnose_recordings
 from ..recording import replace_atomically
 from ..withheld.benches import make_cases
 from ..withheld.cases import draw_case
+from .curves import fit_gap, fit_right
 
 DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
-SURE = 0.9  # probability from which the second curve is taken at the share of its cases that were right
-PRIOR_WIDTH = 3.0  # of a coefficient about that of the uncalibrated curves
 FIELDS = [f.name for f in fields(Evidence)]
-#: which way gain and excess of the null count for a gap; and gain, both shares left, and margin for the first set
-GAP_SENSES = (0, 1, 1)
-RIGHT_SENSES = (0, 1, -1, -1, 1)
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000
 
@@ -109,9 +104,8 @@ def diagnose_bench(
 def calibrate(folder: Path, start: Calibration) -> Calibration:
     """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
 
-    Logistic regression with a weak Gaussian prior about the starting coefficients; the first curve on whether a case
-    held a detectable gap, the second on whether the best set was right among cases that did and in which the first
-    curve sees it. No set is given more than the share of right ones among the cases that the second curve is sure of.
+    The first curve is fitted to whether a case held a detectable gap, the second to whether the best set was right
+    among cases that did and in which the first curve sees it.
     """
     gap_rows, gap_truth, seen, right_rows, right_truth = [], [], [], [], []
     for path in sorted((folder / "keys").glob("*.json")):
@@ -135,14 +129,12 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         seen.append(evidence.gap_features())
         right_rows.append(evidence.right_features())
         right_truth.append(right)
-    gap = _logistic(np.array(gap_rows), np.array(gap_truth), np.array(start.gap), GAP_SENSES)
+    gap = fit_gap(np.array(gap_rows), np.array(gap_truth), start)
     asked = np.array(seen) @ np.array(gap) > 0.0
     rows, truths = np.array(right_rows)[asked], np.array(right_truth)[asked]
-    names = _logistic(rows, truths, np.array(start.right), RIGHT_SENSES)
-    sure = 1.0 / (1.0 + np.exp(-rows @ np.array(names))) > SURE
-    most = (np.sum(truths[sure]) + 1.0) / (sure.sum() + 2.0)  # rule of succession
+    right, most = fit_right(rows, truths, start)
     source = f"{len(gap_rows)} development cases for the first curve, {len(rows)} for the second"
-    return Calibration(tuple(gap), tuple(names), start.addition, start.remainder, round(float(most), 4), source)
+    return Calibration(gap, right, start.addition, start.remainder, most, source)
 
 
 def _twins(one: set[str], other: set[str]) -> bool:
@@ -155,20 +147,3 @@ def _names(verdict: Mapping[str, Any], best: set[str], truth: set[str], members:
     seen = {e for e in truth if members.get(e, DETECTABLE) >= DETECTABLE}
     sets = [set(e["effects"]) for e in verdict["which"] if e.get("group")]
     return any(seen <= s <= truth for s in (sets or [best]))
-
-
-def _logistic(
-    rows: np.ndarray, truth: np.ndarray, centre: np.ndarray, senses: Sequence[int], width: float = PRIOR_WIDTH
-) -> list[float]:
-    """Coefficients (feature,) by maximum a posteriori about ``centre``.
-
-    ``senses`` says which way a feature may count (+1, -1, or 0 for either): more evidence must not lower a probability
-    because a few cases happened to be so.
-    """
-    sign = np.where(truth, 1.0, -1.0)
-
-    def loss(w: np.ndarray) -> float:
-        return float(np.logaddexp(0.0, -sign * (rows @ w)).sum() + 0.5 * np.square((w - centre) / width).sum())
-
-    bounds = [(0.0 if sense > 0 else None, 0.0 if sense < 0 else None) for sense in senses]
-    return [round(float(x), 4) for x in minimize(loss, centre, method="L-BFGS-B", bounds=bounds).x]

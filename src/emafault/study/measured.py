@@ -8,33 +8,10 @@ from pathlib import Path
 
 import yaml
 
-from ..gap.decide import UNCALIBRATED, Calibration
 from ..gap.diagnose import Diagnosis
 from ..recording import replace_atomically
 from ..twins.diagnosed import Withheld, check_file, diagnose_cases
-
-
-def diagnose_file(
-    path: Path, twin: str, out: Path, nameplate: Mapping[str, float] | None = None
-) -> dict[str, Diagnosis]:
-    """Diagnose a user's file or folder by a measured twin: ``diagnosis.json`` and ``report.html`` in ``out``.
-
-    With several cases in the file each has its own folder, and the file at the top holds them under ``cases``.
-
-    Raises
-    ------
-    InputError : a twin, file or case that cannot be used
-    """
-    found = diagnose_cases(twin, Path(path), Calibration.load(UNCALIBRATED), nameplate)
-    verdicts = {case: diagnosis.verdict for case, diagnosis in found.items()}
-    if len(verdicts) == 1:
-        write_json(out / "diagnosis.json", next(iter(verdicts.values())))
-    else:
-        write_json(out / "diagnosis.json", {"bench": Path(path).name, "twin": twin, "cases": verdicts})
-        for case, verdict in verdicts.items():
-            write_json(out / file_name(case) / "diagnosis.json", verdict)
-    draw_page(f"Diagnosis of {Path(path).name}", {Path(path).name: found}, [], out / "report.html", None)
-    return found
+from ..twins.library import calibration_of
 
 
 def diagnose_sets(listed: Path, report: Path, figures: Path, verdicts: Path, withheld: Path) -> None:
@@ -46,10 +23,10 @@ def diagnose_sets(listed: Path, report: Path, figures: Path, verdicts: Path, wit
     """
     folder = Path(listed).parent
     plates = yaml.safe_load((folder / "nameplate.yaml").read_text())
-    calibration = Calibration.load(UNCALIBRATED)
     found: dict[str, dict[str, Diagnosis]] = {}
     rows: list[Withheld] = []
     for entry in yaml.safe_load(Path(listed).read_text()):
+        calibration = calibration_of(entry["twin"])
         for file in entry["files"]:
             path = folder / entry["folder"] / file
             name = f"{entry['folder']}/{file}"

@@ -2,14 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from pathlib import Path
+
+import numpy as np
 
 from emafault.gap.decide import Calibration
 from emafault.gap.diagnose import INTERVAL, Diagnosis, diagnose
 from emafault.gap.held_out import claim, held_out
 from emafault.gap.next_experiment import next_experiments
 from emafault.gap.where import equation_of
-from emafault.gap.which import confusability
+from emafault.gap.which import GROUP_DISTANCE, confusability
 from emafault.twins.library import bench, build_twin, distortions, read_cases
 from emafault.twins.measured import Arrays, MeasuredTwin
 from emafault.twins.reconstructed import reconstruct_measured
@@ -112,13 +115,38 @@ def check_left_out(name: str, case: str, arrays: Arrays, calibration: Calibratio
     singles = [c for c in whole.found.candidates if len(c.effects) == 1]
     if singles and whole.decision.verdict in NAMED:
         strongest = max(singles, key=lambda c: c.gain).effects[0]
-        cosines = confusability(whole.explore, whole.found.null, whole.found.singles)
-        # what leaves the same trace goes with it: a stand-in would be no wrong name
-        out = {strongest} | {e for pair, c in cosines.items() if strongest in pair and c > NEIGHBOUR for e in pair}
+        out = same_trace(whole, strongest)
         left = diagnose_twin(twin.without(*sorted(out)), calibration)
         equations = next(h.equations for h in twin.hypotheses if h.effect == strongest)
         rows.append(_row(name, case, f"left out: {', '.join(sorted(out))}", (), equations, left, calibration))
     return rows
+
+
+def same_trace(whole: Diagnosis, effect: str) -> set[str]:
+    """An effect with what leaves the same trace: where it is left out, a stand-in would be no wrong name.
+
+    That are effects with nearly its signature, and two that together leave what was fitted of it, so that these data
+    cannot tell (three channels' gains are the mean's and two).
+    """
+    problem, null, singles = whole.explore, whole.found.null, whole.found.singles
+    cosines = confusability(problem, null, singles)
+    out = {effect} | {e for pair, c in cosines.items() if effect in pair and c > NEIGHBOUR for e in pair}
+    signatures = {c.effects[0]: problem.whiten(c.signature) for c in singles if np.any(c.signature)}
+    fitted = next((c for c in whole.found.candidates if c.effects == (effect,)), None)
+    if fitted is None:
+        return out
+    trace = problem.whiten(fitted.point.prediction - null.prediction)
+    specified = [bool(problem.parameters[m].specified) for m in problem.nuisances]
+    nuisances = (problem.whiten(null.jacobian) * problem.sd[list(problem.nuisances)])[:, specified]
+    for pair in combinations(sorted(set(signatures) - out), 2):
+        span = np.concatenate([signatures[e] for e in pair], axis=1)
+        dual = problem.projected(null, span)
+        rest = trace - span @ np.linalg.lstsq(span.T @ dual, dual.T @ trace, rcond=1e-9)[0]
+        left = problem.projected(null, rest)
+        # what it takes of a nuisance that nothing specifies is its prior's saying, not the data's
+        if np.square(left).sum() + np.square(nuisances.T @ left).sum() < GROUP_DISTANCE:
+            out |= set(pair)
+    return out
 
 
 def _row(

@@ -4,6 +4,7 @@ from importlib import import_module
 from pathlib import Path
 
 from emafault.errors import InputError
+from emafault.gap.decide import Calibration
 from emafault.twins.measured import Arrays, Distortion, MeasuredTwin
 from emafault.twins.measured_experiments import Bench
 
@@ -16,6 +17,10 @@ MEASURED = (
     "friction_axis",
     "induction_currents",
 )
+
+#: what is believed of each machine's verdicts (see ``study.calibrate_measured``), and of one that has not been redrawn
+CALIBRATIONS = Path(__file__).with_name("calibrations")
+SHARED = "shared"
 
 
 def _module(name: str):
@@ -62,6 +67,12 @@ def build_twin(name: str, case: str, arrays: Arrays) -> MeasuredTwin:
         when the twin is not known or the arrays hold too little to fit and to hold out.
     """
     return _module(name).build(case, arrays)
+
+
+def calibration_of(name: str) -> Calibration:
+    """The frozen curves of a twin; those of all twins together where it has none of its own."""
+    own = CALIBRATIONS / f"{name}.json"
+    return Calibration.load(own if own.exists() else CALIBRATIONS / f"{SHARED}.json")
 
 
 def measured_twins(name: str, path: Path) -> dict[str, MeasuredTwin]:
