@@ -86,19 +86,19 @@ def _wrap(x, period):
 
 
 @compiled
-def _put(m, n, phi, r, y, norm, count, store):
-    y[m] += phi * r
-    norm[m] += phi * phi
+def _put(m, n, phi, r, sums, count, store):
+    sums[m, 0] += phi * r
+    sums[m, 1] += phi * phi
     if store is not None:  # decided when it is compiled
         count[m] += 1
         store[m, n] = phi
 
 
 @compiled
-def _put_instrument(m, n, z, phi, r, y, norm, power, count, store):
+def _put_instrument(m, n, z, phi, r, sums, power, count, store):
     """As ``_put`` with an instrument z whose noise is independent of that of r and phi."""
-    y[m] += z * r
-    norm[m] += z * phi
+    sums[m, 0] += z * r
+    sums[m, 1] += z * phi
     power[m] += z * z
     if store is not None:
         count[m] += 1
@@ -196,8 +196,7 @@ def fill_statistics(
     R, L, k, poles, J, B, T_c, ratio = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
     theta_0, Vdc, K_pos, K_p, K_i, I_max, w_max = c[8], c[9], c[10], c[11], c[12], c[13], c[14]
     n_time = theta.shape[0]
-    y[:] = 0.0
-    norm[:] = 1e-12
+    sums = np.zeros((y.shape[0], 2))
     count[:] = 0
     power, cross, cross_power, product = np.zeros(y.shape[0]), np.zeros(3), np.zeros(3), np.zeros(2)
     ramp, pairs = np.pi / 6.0, int(np.round(poles))
@@ -266,97 +265,97 @@ def fill_statistics(
             if not in_motion:
                 # where exactly the rotor comes to rest is chance, and may be at the very edge of a commutation
                 if floating[j] > 0.0:
-                    _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+                    _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], sums, count, store)
                 continue
             if plateau[j] > 0.0:
                 s = sign[j]
-                _put(base, n, s * w, r, y, norm, count, store)
-                _put(base + 1, n, i[n, j], r, y, norm, count, store)
-                _put(base + 2, n, 1.0, r, y, norm, count, store)
-                _put_instrument(base + 3, n, others, di, r, y, norm, power, count, store)
+                _put(base, n, s * w, r, sums, count, store)
+                _put(base + 1, n, i[n, j], r, sums, count, store)
+                _put(base + 2, n, 1.0, r, sums, count, store)
+                _put_instrument(base + 3, n, others, di, r, sums, power, count, store)
                 square = i[n, j] * i[n, j]
-                _put_instrument(base + 4, n, square * others, square * di, r, y, norm, power, count, store)
+                _put_instrument(base + 4, n, square * others, square * di, r, sums, power, count, store)
                 cross[j] += square * others * di
                 cross_power[j] += square * others * others
-                _put(base + 5, n, s * w * cos_1, r, y, norm, count, store)
-                _put(base + 6, n, s * w * sin_1, r, y, norm, count, store)
-                _put(base + 7, n, i[n, j] * t, r, y, norm, count, store)
-                _put(base + 8, n, s * w * t, r, y, norm, count, store)
-                _put(base + 9, n, abs(i[n, j]) * i[n, j], r, y, norm, count, store)
-                _put(base + 10, n, s, r, y, norm, count, store)
+                _put(base + 5, n, s * w * cos_1, r, sums, count, store)
+                _put(base + 6, n, s * w * sin_1, r, sums, count, store)
+                _put(base + 7, n, i[n, j] * t, r, sums, count, store)
+                _put(base + 8, n, s * w * t, r, sums, count, store)
+                _put(base + 9, n, abs(i[n, j]) * i[n, j], r, sums, count, store)
+                _put(base + 10, n, s, r, sums, count, store)
             elif floating[j] > 0.0:
-                _put(base + 11, n, f[j] * w, r, y, norm, count, store)
-                _put(base + 12, n, slope[j] * w, r, y, norm, count, store)
-                _put(base + 13, n, 1.0, r, y, norm, count, store)
-                _put(base + 14, n, f[j] * w * cos_1, r, y, norm, count, store)
-                _put(base + 15, n, f[j] * w * sin_1, r, y, norm, count, store)
-                _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], y, norm, count, store)
+                _put(base + 11, n, f[j] * w, r, sums, count, store)
+                _put(base + 12, n, slope[j] * w, r, sums, count, store)
+                _put(base + 13, n, 1.0, r, sums, count, store)
+                _put(base + 14, n, f[j] * w * cos_1, r, sums, count, store)
+                _put(base + 15, n, f[j] * w * sin_1, r, sums, count, store)
+                _put(SUM_I_AT + 4 + j, n, 1.0, i[n, j], sums, count, store)
             else:
-                _put_instrument(base + 16, n, others, di, r, y, norm, power, count, store)
-                _put(base + 17, n, i[n, j], r, y, norm, count, store)
-                _put(base + 18, n, f[j] * w, r, y, norm, count, store)
+                _put_instrument(base + 16, n, others, di, r, sums, power, count, store)
+                _put(base + 17, n, i[n, j], r, sums, count, store)
+                _put(base + 18, n, f[j] * w, r, sums, count, store)
             if span < 0.35:
                 # sin 5x and sin 7x as polynomials of sin x
                 sx = sin_p * _COS_AXIS[j] - cos_p * _SIN_AXIS[j]
                 s2 = sx * sx
                 sin_5 = sx * (5.0 + s2 * (-20.0 + 16.0 * s2))
                 sin_7 = sx * (7.0 + s2 * (-56.0 + s2 * (112.0 - 64.0 * s2)))
-                _put(base + 19, n, w * sin_5, r, y, norm, count, store)
-                _put(base + 20, n, w * sin_7, r, y, norm, count, store)
-                _put(base + 21 + min(ANGLE_BINS - 1, int(x[j] / TWO_PI * ANGLE_BINS)), n, w, r, y, norm, count, store)
+                _put(base + 19, n, w * sin_5, r, sums, count, store)
+                _put(base + 20, n, w * sin_7, r, sums, count, store)
+                _put(base + 21 + min(ANGLE_BINS - 1, int(x[j] / TWO_PI * ANGLE_BINS)), n, w, r, sums, count, store)
         # ---- sums over the phases
         residual[3, n] = sum_i
-        _put(SUM_I_AT, n, 1.0, sum_i, y, norm, count, store)
+        _put(SUM_I_AT, n, 1.0, sum_i, sums, count, store)
         for j in range(3):
-            _put(SUM_I_AT + 1 + j, n, i[n, j], sum_i, y, norm, count, store)
+            _put(SUM_I_AT + 1 + j, n, i[n, j], sum_i, sums, count, store)
         residual[4, n] = sum_r
         if in_motion:
-            _put(SUM_V_AT, n, 1.0, sum_r, y, norm, count, store)
-            _put(SUM_V_AT + 1, n, sum_f * w, sum_r, y, norm, count, store)
+            _put(SUM_V_AT, n, 1.0, sum_r, sums, count, store)
+            _put(SUM_V_AT + 1, n, sum_f * w, sum_r, sums, count, store)
         # ---- speed sensor against the angle
         r = speed[n] - (theta[n] - theta[n - 1]) / dt
         residual[5, n] = r
-        _put(SPEED_AT, n, 1.0, r, y, norm, count, store)
-        _put(SPEED_AT + 1, n, w, r, y, norm, count, store)
-        _put(SPEED_AT + 2, n, a_slow, r, y, norm, count, store)
-        _put(SPEED_AT + 3, n, 1.0 if w > 0.0 else -1.0, r, y, norm, count, store)
+        _put(SPEED_AT, n, 1.0, r, sums, count, store)
+        _put(SPEED_AT + 1, n, w, r, sums, count, store)
+        _put(SPEED_AT + 2, n, a_slow, r, sums, count, store)
+        _put(SPEED_AT + 3, n, 1.0 if w > 0.0 else -1.0, r, sums, count, store)
         # ---- torque balance in motion
         if in_motion:
             d = 1.0 if w > 0.0 else -1.0
             r = drive - J * a - B * w - T_c * d
             residual[6, n] = r
             base = TORQUE_AT if d > 0.0 else TORQUE_AT + PER_DIRECTION
-            _put(base, n, weight * d, r, y, norm, count, store)
-            _put(base + 1, n, weight * w, r, y, norm, count, store)
-            _put(base + 2, n, weight * a_slow, r, y, norm, count, store)
+            _put(base, n, weight * d, r, sums, count, store)
+            _put(base + 1, n, weight * w, r, sums, count, store)
+            _put(base + 2, n, weight * a_slow, r, sums, count, store)
             for b in range(_SPEEDS.shape[0] - 1):
                 if _SPEEDS[b] <= abs(w) < _SPEEDS[b + 1]:
-                    _put(base + 3 + b, n, weight * d, r, y, norm, count, store)
-            _put(TORQUE_REST_AT, n, weight * shaft[n], r, y, norm, count, store)
-            _put(TORQUE_REST_AT + 1, n, weight * drive, r, y, norm, count, store)
-            _put(TORQUE_REST_AT + 2, n, weight * d * t, r, y, norm, count, store)
+                    _put(base + 3 + b, n, weight * d, r, sums, count, store)
+            _put(TORQUE_REST_AT, n, weight * shaft[n], r, sums, count, store)
+            _put(TORQUE_REST_AT + 1, n, weight * drive, r, sums, count, store)
+            _put(TORQUE_REST_AT + 2, n, weight * d * t, r, sums, count, store)
             for o in range(_ORDER_LIST.shape[0]):
                 reach = _ORDER_LIST[o] * abs(w) * dt
                 if reach < 2.0:
-                    _put(ORDERS_AT + 2 * o, n, weight * turn_cos[o], r, y, norm, count, store)
-                    _put(ORDERS_AT + 2 * o + 1, n, weight * turn_sin[o], r, y, norm, count, store)
+                    _put(ORDERS_AT + 2 * o, n, weight * turn_cos[o], r, sums, count, store)
+                    _put(ORDERS_AT + 2 * o + 1, n, weight * turn_sin[o], r, sums, count, store)
         # ---- play between the rotor and the user shaft
         r = shaft[n] - (middle + 0.5 * (theta[n] - theta[n - 1]) - theta_0) / ratio
         residual[7, n] = r
         smooth_play += (r - smooth_play) * min(1.0, dt / 5.0e-3)
         play_power += (r - smooth_play) ** 2
         if in_motion:
-            _put(POSITION_AT + (0 if w > 0.0 else 1), n, weight, r, y, norm, count, store)
-        _put(POSITION_AT + 2, n, a_slow, r, y, norm, count, store)
-        _put(POSITION_AT + 3, n, w, r, y, norm, count, store)
-        _put(POSITION_AT + 4, n, drive, r, y, norm, count, store)
+            _put(POSITION_AT + (0 if w > 0.0 else 1), n, weight, r, sums, count, store)
+        _put(POSITION_AT + 2, n, a_slow, r, sums, count, store)
+        _put(POSITION_AT + 3, n, w, r, sums, count, store)
+        _put(POSITION_AT + 4, n, drive, r, sums, count, store)
         # ---- bus
         if has_bus:
             r = bus[n] - Vdc
             residual[8, n] = r
-            _put(BUS_AT, n, 1.0, r, y, norm, count, store)
-            _put(BUS_AT + 1, n, level, r, y, norm, count, store)
-            _put(BUS_AT + 2, n, drive * w, r, y, norm, count, store)
+            _put(BUS_AT, n, 1.0, r, sums, count, store)
+            _put(BUS_AT + 1, n, level, r, sums, count, store)
+            _put(BUS_AT + 2, n, drive * w, r, sums, count, store)
             product[0] += level
             product[1] += drive * w
         # ---- controller: measured pair current against the reference that the recorded inputs give
@@ -389,13 +388,13 @@ def fill_statistics(
                 base = COMMUTATION_AT + 4 * j
                 on, off = half - ramp, np.pi - ramp - half  # electrical angle inside the two edges
                 if -WINDOW < on < 0.0:
-                    _put(base, n, 1.0, share - _shared(on, span), y, norm, count, store)
+                    _put(base, n, 1.0, share - _shared(on, span), sums, count, store)
                 elif 0.0 <= on < WINDOW:
-                    _put(base + 1, n, 1.0, share - _shared(on, span), y, norm, count, store)
+                    _put(base + 1, n, 1.0, share - _shared(on, span), sums, count, store)
                 elif 0.0 < off < WINDOW:
-                    _put(base + 2, n, 1.0, share - _shared(off, span), y, norm, count, store)
+                    _put(base + 2, n, 1.0, share - _shared(off, span), sums, count, store)
                 elif -WINDOW < off <= 0.0:
-                    _put(base + 3, n, 1.0, share - _shared(off, span), y, norm, count, store)
+                    _put(base + 3, n, 1.0, share - _shared(off, span), sums, count, store)
     # ---- the regulator's residual beside the slope of its reference, smooth so that noise does not drown it
     reach = int(max(1.0, round(REGULATOR_SMOOTHING / dt)))
     total = np.zeros(n_time + 1)
@@ -410,7 +409,9 @@ def fill_statistics(
                 at = n + 2 * reach * (1 - m)
                 later = total[at + 2 * reach + 1] - total[at + 1]
                 earlier = total[at] - total[at - 2 * reach]
-                _put(CONTROL_AT + m, n, (later - earlier) / (2 * reach), r, y, norm, count, store)
+                _put(CONTROL_AT + m, n, (later - earlier) / (2 * reach), r, sums, count, store)
+    y[:] = sums[:, 0]
+    norm[:] = sums[:, 1] + 1e-12
     # i^2 counts from its mean by the instrument's weight: an inductance that is merely another leaves no trace then
     for j in range(3):
         m = j * PER_PHASE + 3
