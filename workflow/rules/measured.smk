@@ -40,7 +40,7 @@ rule calibrate_measured:
         mem_mb=1000,
         runtime=10,
     params:
-        draws=60,
+        draws=150,
         seed=1,
         code=code("calibrate_measured"),
     script:
