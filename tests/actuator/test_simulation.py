@@ -3,12 +3,15 @@
 import os
 import subprocess
 import sys
+from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from emafault.actuator.commands import command_positions, jumps_of
 from emafault.actuator.conduction import LANES, NEVER, passing
+from emafault.actuator.lane import stays_off
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate, simulate_each
 from emafault.config import reference_actuator
@@ -16,8 +19,6 @@ from emafault.effects import EFFECTS
 
 ACTUATOR = reference_actuator()
 HEALTHY = np.zeros((1, 6))
-#: signal -> what a straight line in place of a curve may change in it (rad/s, rad)
-BENDS = {"rotor_speed": 1e-3, "rotor_angle": 2e-6, "output_position": 2e-8}
 FAULT = np.array([[0.08, 0.03, 0.0, 0.12, -0.05, 40.0]])
 
 
@@ -185,9 +186,8 @@ def test_locked_rotor_reaches_the_steady_current_of_two_phases(fault):
         {"dynamic_eccentricity": {"d": 0.03, "psi": 1.0}, "back_emf_shape": {"width": 115.0, "h5": 0.02, "h7": 0.01}},
     ],
 )
-def test_a_loop_in_two_phases_is_the_general_run(effects):
-    """The fast loop and the general segment are two writings of one physics: a supply resistance of nothing but
-    rounding keeps a run out of the fast loop and must not change it."""
+def test_extras_that_are_nothing_change_nothing(effects):
+    """A supply resistance of nothing but rounding is followed with every extra, and must not change the run."""
     for name, settings, duration in (
         ("parabolic", {"acceleration": 0.4}, 0.3),
         ("reversal", {"amplitude": 0.02, "speed": 0.3}, 0.3),
@@ -197,11 +197,77 @@ def test_a_loop_in_two_phases_is_the_general_run(effects):
         general = make_runs(ACTUATOR, FAULT, effects=on | {"bus_resistance": {"R": np.array([1e-13])}})
         slow = simulate(general, command(name, duration, **settings), duration, 2e-4)
         for signal, values in fast.items():
-            # what bends within a segment is a straight line in one of them and a parabola in the other
-            exact = set(effects) <= {"inductance_saturation"}
-            if exact or signal in BENDS:
-                limit = 1e-6 if exact else BENDS[signal]
-                assert values == pytest.approx(slow[signal], rel=limit, abs=limit), (name, signal)
+            assert values == pytest.approx(slow[signal], rel=1e-6, abs=1e-6), (name, signal)
+
+
+GENERAL = """
+import sys
+
+import numpy as np
+
+from emafault.actuator import kernel
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.simulate import simulate
+from emafault.config import reference_actuator
+
+actuator, fault = reference_actuator(), np.array([[0.15, 0.0, 0.05, 0.0, 0.0, 30.0]])
+light = {"inertia": {"scale": np.array([float(sys.argv[3])])}}
+runs = make_runs(actuator, fault, effects=light)
+handed = {True: 0, False: 0}
+taken = kernel.hand_over
+
+def hand_over(*given):
+    done = taken(*given) if sys.argv[2] == "lanes" else False
+    handed[bool(done)] += abs(given[1].w) > 250.0
+    return done
+
+kernel.hand_over = hand_over
+command = command_positions("step", {"amplitude": 0.5, "time": 0.001}, 0.012, actuator.control_period)
+signals = simulate(runs, command, 0.012, 2e-4)
+np.savez(sys.argv[1], fast=[handed[True], handed[False]], **signals)
+"""
+
+
+@pytest.mark.parametrize(("inertia", "fast"), [(1.0, False), (0.05, True)])
+def test_a_lane_is_the_general_run(tmp_path, inertia, fast):
+    """Lanes and the general segment are two writings of one physics, at low speed and where a terminal nears a rail."""
+    found = {}
+    for way in ("lanes", "general"):
+        path = tmp_path / f"{way}.npz"
+        arguments = [sys.executable, "-W", "ignore", "-c", GENERAL, path, way, str(inertia)]
+        subprocess.run(arguments, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, check=True)
+        found[way] = dict(np.load(path))
+    in_lanes, in_general = found["lanes"].pop("fast")
+    assert not fast or (in_lanes > 10 and in_general > 10)
+    for name, values in found["lanes"].items():
+        assert values == pytest.approx(found["general"][name], rel=1e-6, abs=1e-6), name
+
+
+def test_a_terminal_that_is_said_to_stay_off_never_reaches_a_rail():
+    """Against the star point's voltage itself, over the angles, currents and directions that it is said of."""
+    rng = np.random.default_rng(4)
+    said = 0
+    for _ in range(3000):
+        k, L, R = (x * rng.uniform(0.6, 1.4, 3) for x in (0.0752, 8e-4, 1.1))
+        s = SimpleNamespace(sagging=False, L=L, R=R, K=k * rng.uniform(-1.0, 1.0, 3), dK=k * rng.uniform(-8.0, 8.0, 3))
+        s.inverse_L_pair = [1.0 / (L[(j + 1) % 3] + L[(j + 2) % 3]) for j in range(3)]
+        p = SimpleNamespace(inductance_saturation_s=0.0, switch_resistance=0.1, bus_voltage_Vdc=48.0, diode_voltage=0.8)
+        plus, minus, off = rng.permutation(3)
+        w, gone, current = rng.uniform(0.0, 600.0), rng.uniform(-0.05, 0.05), rng.uniform(0.0, 20.0)
+        if not stays_off.py_func(p, s, plus, minus, off, w, gone, current):
+            continue
+        said += 1
+        for part, i, sign, high in product((0.0, 0.5, 1.0), (-current, current), (-w, w), (True, False)):
+            K = s.K + part * gone * s.dK
+            v_plus, v_minus = (48.0, 0.0) if high else (0.0, 48.0)
+            across = (
+                v_plus - K[plus] * sign - (R[plus] + 0.1) * i,
+                v_minus - K[minus] * sign + (R[minus] + 0.1) * i,
+            )
+            star = (across[0] / L[plus] + across[1] / L[minus]) / (1.0 / L[plus] + 1.0 / L[minus])
+            assert -0.8 <= star + K[off] * sign <= 48.8
+    assert 300 < said < 2700
 
 
 @pytest.mark.parametrize(

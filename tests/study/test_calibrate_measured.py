@@ -72,8 +72,10 @@ def test_only_machines_whose_residual_is_known_are_redrawn(tmp_path):
     listed = tmp_path / "sets.yaml"
     files = "[f40_merged.csv.gz, f60_kotleta_bench_log.csv.gz]"
     listed.write_text(f"- {{folder: bldc_sixstep_esc, twin: six_step_bus, files: {files}}}\n")
-    ((name, usable),) = machines(listed, START)
-    assert name == "six_step_bus" and [d.verdict["bench"] for d in usable] == ["f40_merged"]
+    found = machines(listed, START)
+    assert {name: [d.verdict["bench"] for d in usable] for name, usable in found.items()} == {
+        "six_step_bus": ["f40_merged"]
+    }
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,27 @@ BUS_FILTER = 1.0e-3  # s
 NEAR = 1.0e-4  # of the time to a trip, that a step of Newton may move it by and the next one to leave it exact
 
 
+LANES = 8
+ROWS = 37
+#: where the rows of the lanes' table begin, a number per lane each. What goes on: current (A), speed (rad/s), +1 or -1
+#: for a pair on +V or -V, time gone (s), angle gone (rad), integral of the current (A s), 1 while the lane goes on;
+#: the current behind the bus's filter (A), integrals of the current's square (A2 s) and of the supply (V s)
+(I, SPEED, SIGN, TIME, ANGLE, AREA, LIVE, BUS_CURRENT, SQUARE, BUS_AREA) = range(0, 10 * LANES, LANES)
+#: what stays: how far to go (s); the current at which the comparator switches up and down (A); supply (V), resistance
+#: (ohm), 1/inductance (1/H) of the loop without current, s of L/(1 + s i^2) (1/A2) and resistance of the bus (ohm); the
+#: loop's back-EMF coefficient (V s/rad) and the torque against the motion, of load and, in motion, friction (N m), each
+#: with two derivatives by the angle; the torque by speed (N m s/rad); 1/inertia (1/(kg m2), 0 at rest); direction of
+#: motion or 0; the torque that friction holds at rest in either direction (N m); edges of the cell from where the rotor
+#: is (rad)
+(DURATION, TOP, BOTTOM, SUPPLY, RESISTANCE, INVERSE_L, SATURATION, BUS_RESISTANCE, BACK_EMF, SLOPE, CURVATURE, TORQUE,
+ STIFFNESS, BEND, VISCOUS, INVERSE_INERTIA, MOVING, LIMIT_FORWARD, LIMIT_BACKWARD, LOWER,
+ UPPER) = range(10 * LANES, 31 * LANES, LANES)  # fmt: skip
+#: of a comparator trip that the reversed series misses: the time before which it comes (s, else 0) and its polynomial,
+#: the first of whose coefficients gives way to its root (s), which is nil where it is not known
+(MISSED, C0, C1, C2, C3, C4) = range(31 * LANES, 37 * LANES, LANES)
+TRIP = C0
+
+
 @compiled
 def crossing(c0, c1, c2, c3, c4, h):
     """First t in (0, h] at which c0 + c1 t + c2 t^2 + c3 t^3 + c4 t^4 changes sign; NEVER if it does not by t = h."""
@@ -58,27 +79,6 @@ def passing(beyond, direction, c1, c2, c3, h):
     return crossing(beyond, c1, c2, c3, 0.0, h)
 
 
-LANES = 8
-ROWS = 37
-#: where the rows of the lanes' table begin, a number per lane each. What goes on: current (A), speed (rad/s), +1 or -1
-#: for a pair on +V or -V, time gone (s), angle gone (rad), integral of the current (A s), 1 while the lane goes on;
-#: the current behind the bus's filter (A), integrals of the current's square (A2 s) and of the supply (V s)
-(I, SPEED, SIGN, TIME, ANGLE, AREA, LIVE, BUS_CURRENT, SQUARE, BUS_AREA) = range(0, 10 * LANES, LANES)
-#: what stays: how far to go (s); the current at which the comparator switches up and down (A); supply (V), resistance
-#: (ohm), 1/inductance (1/H) of the loop without current, s of L/(1 + s i^2) (1/A2) and resistance of the bus (ohm); the
-#: loop's back-EMF coefficient (V s/rad) and the torque against the motion, of load and, in motion, friction (N m), each
-#: with two derivatives by the angle; the torque by speed (N m s/rad); 1/inertia (1/(kg m2), 0 at rest); direction of
-#: motion or 0; the torque that friction holds at rest in either direction (N m); edges of the cell from where the rotor
-#: is (rad)
-(DURATION, TOP, BOTTOM, SUPPLY, RESISTANCE, INVERSE_L, SATURATION, BUS_RESISTANCE, BACK_EMF, SLOPE, CURVATURE, TORQUE,
- STIFFNESS, BEND, VISCOUS, INVERSE_INERTIA, MOVING, LIMIT_FORWARD, LIMIT_BACKWARD, LOWER,
- UPPER) = range(10 * LANES, 31 * LANES, LANES)  # fmt: skip
-#: of a comparator trip that the reversed series misses: the time before which it comes (s, else 0) and its polynomial,
-#: the first of whose coefficients gives way to its root (s), which is nil where it is not known
-(MISSED, C0, C1, C2, C3, C4) = range(31 * LANES, 37 * LANES, LANES)
-TRIP = C0
-
-
 def _segment_of(extras: bool):
     """One segment of every lane; extras are a saturating inductance, a bus that gives way and the square's integral.
 
@@ -90,12 +90,8 @@ def _segment_of(extras: bool):
         # without branches, conditional loads or stores: only then the compiler puts the lanes into one instruction
         for n in range(lanes):
             i, w, sign, t, gone, live = x[I + n], x[SPEED + n], x[SIGN + n], x[TIME + n], x[ANGLE + n], x[LIVE + n]
-            R, gamma, viscous, inverse_inertia = (
-                x[RESISTANCE + n],
-                x[INVERSE_L + n],
-                x[VISCOUS + n],
-                x[INVERSE_INERTIA + n],
-            )
+            R, gamma = x[RESISTANCE + n], x[INVERSE_L + n]
+            viscous, inverse_inertia = x[VISCOUS + n], x[INVERSE_INERTIA + n]
             dK, ddK, dT, ddT = x[SLOPE + n], x[CURVATURE + n], x[STIFFNESS + n], x[BEND + n]
             duration, top, bottom = x[DURATION + n], x[TOP + n], x[BOTTOM + n]
             moving, trip = x[MOVING + n], x[TRIP + n]
@@ -138,7 +134,8 @@ def _segment_of(extras: bool):
             off = i - goal
             end = i + h * (y1 + h * (y2 + h * (y3 + h * y4)))
             tripped = off * (end - goal) < 0.0
-            # the time of a trip by the reversed series and two steps of Newton
+            # the time of a trip by the reversed series and two steps of Newton, the second of which leaves less than
+            # rounding unless the current turns round
             inverse = 1.0 / y1
             u, q, r = -off * inverse, y2 * inverse, y3 * inverse
             u *= 1.0 - u * (q - u * (2.0 * q * q - r))
@@ -148,7 +145,6 @@ def _segment_of(extras: bool):
             u -= step
             square = u * u
             u -= ((off + u * y1) + square * ((y2 + u * y3) + square * y4)) * per
-            # leave less than rounding, but where the current turns round
             step = step if step > 0.0 else -step
             missed = tripped & (not ((step <= NEAR * u) & (u <= h))) & (trip == 0.0) & (live != 0.0)
             u = trip if trip != 0.0 else u

@@ -132,9 +132,9 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
     gap = fit_gap(np.array(gap_rows), np.array(gap_truth), start)
     asked = np.array(seen) @ np.array(gap) > 0.0
     rows, truths = np.array(right_rows)[asked], np.array(right_truth)[asked]
-    right, most = fit_right(rows, truths, start)
+    curve, most = fit_right(rows, truths, start)
     source = f"{len(gap_rows)} development cases for the first curve, {len(rows)} for the second"
-    return Calibration(gap, right, start.addition, start.remainder, most, source)
+    return Calibration(gap, curve, start.addition, start.remainder, most, source)
 
 
 def _twins(one: set[str], other: set[str]) -> bool:

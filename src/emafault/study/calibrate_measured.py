@@ -1,6 +1,6 @@
 """Calibration of the second curve for measured machines, on redrawn ones whose truth is known."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,15 +19,9 @@ from .measured import write_json
 
 @dataclass(frozen=True)
 class Redrawing:
-    """One diagnosis of a redrawn machine, with its effect in the library or left out."""
+    """One diagnosis of a redrawn machine: its evidence, and whether the best set, or one of its group, is right."""
 
-    twin: str
-    case: str
-    effect: str
-    distance: float
-    left_out: bool
     evidence: Evidence
-    best: tuple[str, ...]
     right: bool
 
 
@@ -48,7 +42,7 @@ def calibrate_measured(listed: Path, folder: Path, check: Path, draws: int, seed
     InputError : a file that is not what its twin needs
     """
     start = Calibration.load(UNCALIBRATED)
-    usable = dict(machines(listed, start))
+    usable = machines(listed, start)
     drawn = {name: redrawings(name, found, draws, seed) for name, found in usable.items()}
     shared = fit([case for cases in drawn.values() for case in cases], start)
     own = {name: fit(cases, shared) for name, cases in drawn.items()}
@@ -63,8 +57,8 @@ def calibrate_measured(listed: Path, folder: Path, check: Path, draws: int, seed
         calibration.save(Path(folder) / f"{name}.json")
 
 
-def machines(listed: Path, calibration: Calibration) -> Iterator[tuple[str, list[Diagnosis]]]:
-    """Twin by twin, its machines that can be redrawn: what they leave is known, for they have a cause or no gap."""
+def machines(listed: Path, calibration: Calibration) -> dict[str, list[Diagnosis]]:
+    """The machines of each twin that can be redrawn: what they leave is known, for they have a cause or no gap."""
     of: dict[str, list[Diagnosis]] = {}
     for entry in yaml.safe_load(Path(listed).read_text()):
         for file in entry["files"]:
@@ -72,7 +66,7 @@ def machines(listed: Path, calibration: Calibration) -> Iterator[tuple[str, list
             found = [diagnose_twin(twin, calibration) for twin in measured_twins(entry["twin"], path).values()]
             usable = [d for d in found if d.ladder is not None and d.decision.verdict in (*NAMED, "no_gap")]
             of.setdefault(entry["twin"], []).extend(usable)
-    yield from of.items()
+    return of
 
 
 def redrawings(name: str, machines: Sequence[Diagnosis], draws: int, seed: int) -> list[Redrawing]:
@@ -80,21 +74,16 @@ def redrawings(name: str, machines: Sequence[Diagnosis], draws: int, seed: int) 
     rng = np.random.default_rng([seed, *name.encode()])
     out = []
     for _ in range(draws if machines else 0):
-        drawn = redraw(machines[rng.integers(len(machines))], rng, DETECTABLE)
+        drawn = redraw(machines[int(rng.integers(len(machines)))], rng, DETECTABLE)
         if drawn is None:
             continue
         whole = diagnose_twin(drawn.twin, Calibration.load(UNCALIBRATED))
         alike = same_trace(whole, drawn.effect)
         left = diagnose_twin(drawn.twin.without(*sorted(alike)), Calibration.load(UNCALIBRATED))
-        for left_out, found in ((False, whole), (True, left)):
+        for known, found in ((alike, whole), (set[str](), left)):
             if found.found.candidates:
-                best = found.found.candidates[0].effects
-                sets = [set(c.effects) for c in found.decision.group] or [set(best)]
-                right = not left_out and any(s & alike for s in sets)
-                evidence = found.decision.evidence
-                out.append(
-                    Redrawing(name, drawn.twin.case, drawn.effect, drawn.distance, left_out, evidence, best, right)
-                )
+                sets = found.decision.group or found.found.candidates[:1]
+                out.append(Redrawing(found.decision.evidence, any(known & set(c.effects) for c in sets)))
     return out
 
 

@@ -462,7 +462,6 @@ class ActuatorTwin:
 
     def smooth(self, values: np.ndarray, part: Sequence[str]) -> np.ndarray:
         """(statistic,) prediction averaged over where its switching falls."""
-
         runs = {name: self._runs(values[None, :], name)[0] for name in part}
         keys = {name: (name, run.tobytes()) for name, run in runs.items()}
         missing = {name: run for name, run in runs.items() if keys[name] not in self._averages}

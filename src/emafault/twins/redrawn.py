@@ -46,7 +46,7 @@ def redraw(machine: Diagnosis, rng: np.random.Generator, least: float) -> Redraw
         if p.effect is not None:
             base[m] = p.off
     for _ in range(TRIES):
-        hypothesis = twin.hypotheses[rng.integers(len(twin.hypotheses))]
+        hypothesis = twin.hypotheses[int(rng.integers(len(twin.hypotheses)))]
         truth = base.copy()
         truth[problem.effect_parameters(hypothesis)] = draw_parameters(machine, hypothesis, rng)
         explored = problem.predict(np.array([base, truth]))
