@@ -67,6 +67,10 @@ def test_a_curve_fitted_to_one_draw_helps_on_another():
     assert fitted.gap == START.gap and 0.5 < fitted.most < 1.0
 
 
+def test_without_redrawn_machines_a_calibration_stays_as_it_is():
+    assert fit([], START) == START
+
+
 def test_only_machines_whose_residual_is_known_are_redrawn(tmp_path):
     (tmp_path / "bldc_sixstep_esc").symlink_to(DATA / "bldc_sixstep_esc")
     listed = tmp_path / "sets.yaml"

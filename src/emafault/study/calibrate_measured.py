@@ -88,8 +88,10 @@ def redrawings(name: str, machines: Sequence[Diagnosis], draws: int, seed: int) 
 
 
 def fit(cases: Sequence[Redrawing], start: Calibration) -> Calibration:
-    """A calibration with its second curve fitted to cases in which the first one sees a gap."""
+    """A calibration with its second curve fitted to cases in which the first one sees a gap; as it is without any."""
     seen = [c for c in cases if float(np.dot(start.gap, c.evidence.gap_features())) > 0.0]
+    if not seen:
+        return start
     rows = np.array([c.evidence.right_features() for c in seen])
     right, most = fit_right(rows, np.array([c.right for c in seen]), start)
     source = f"{len(seen)} diagnoses of redrawn machines for the second curve, the prior for the first"
