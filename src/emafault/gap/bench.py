@@ -11,7 +11,6 @@ from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import detrend
 
 from ..actuator.commands import jumps_of
 from ..actuator.motor import AXIS
@@ -159,6 +158,8 @@ def _follows(wanted: np.ndarray, got: np.ndarray) -> tuple[bool, float, float]:
 def _alike_but_for_drift(wanted: np.ndarray, got: np.ndarray, interval: float) -> bool:
     """Whether an integrated speed follows an angle once a constant speed is taken off: a coarsely truncated speed has
     one."""
+    from scipy.signal import detrend  # a second to import, and seldom needed
+
     time = np.arange(len(wanted)) * interval
     drift, bent, other = np.polyfit(time, got - wanted, 1)[0], detrend(wanted), detrend(got)
     return bool(abs(drift) < DRIFT and np.ptp(bent) > BENT and _follows(bent, other)[0])

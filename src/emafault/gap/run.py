@@ -77,21 +77,26 @@ def diagnose_path(
         cases = {name: diagnose_bench(path, spec, exclude)}
     else:
         cases = diagnose_measured(path, twin, exclude)
+    folders = {case: folder if len(cases) == 1 else folder / _file_name(case) for case in cases}
     for case, found in cases.items():
-        write_case(folder if len(cases) == 1 else folder / _file_name(case), found)
+        write_verdict(folders[case], found)
         if found.experiment and experiment is not None:
             _write(Path(experiment), found.experiment)
     if len(cases) > 1:
         _write(
             folder / VERDICT, to_json({"bench": name, "twin": twin, "cases": {c: f.verdict for c, f in cases.items()}})
         )
-        _write_contents(folder, name, list(cases))
+    # pictures and tracking take as long again: nobody need wait for them to read the verdict
     for found in cases.values():
-        print(summary(found.verdict))
-    print(f"written to {folder}")
+        print(summary(found.verdict), flush=True)
+    for case, found in cases.items():
+        write_pages(folders[case], found)
+    if len(cases) > 1:
+        _write_contents(folder, name, list(cases))
+    print(f"written to {folder}", flush=True)
     if track:
         for case, found in cases.items():
-            _track(spec["tracking"], folder if len(cases) == 1 else folder / _file_name(case), found.verdict)
+            _track(spec["tracking"], folders[case], found.verdict)
     return {case: found.verdict for case, found in cases.items()}
 
 
@@ -205,8 +210,20 @@ def diagnose_measured(path: Path, twin: str, exclude: Sequence[str] = ()) -> dic
 # --- what is written -------------------------------------------------------------------------------------------------
 
 
-def write_case(folder: Path, found: Diagnosed) -> None:
-    """Write verdict, report and, where there is one, the experiment of one diagnosis.
+def write_verdict(folder: Path, found: Diagnosed) -> None:
+    """Write the verdict and, where there is one, the experiment of one diagnosis.
+
+    Raises
+    ------
+    InputError : a file that cannot be written
+    """
+    _write(folder / VERDICT, to_json(found.verdict))
+    if found.experiment:
+        _write(folder / EXPERIMENT, found.experiment)
+
+
+def write_pages(folder: Path, found: Diagnosed) -> None:
+    """Write the report of one diagnosis.
 
     Raises
     ------
@@ -215,9 +232,6 @@ def write_case(folder: Path, found: Diagnosed) -> None:
     from .report import write_report
     from .retrained import section
 
-    _write(folder / VERDICT, to_json(found.verdict))
-    if found.experiment:
-        _write(folder / EXPERIMENT, found.experiment)
     retrained = section(folder, found.verdict)
     write_report(found.diagnosis, folder / REPORT, found.truths, found.region, retrained, found.labels)
 
