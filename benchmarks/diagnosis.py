@@ -65,7 +65,6 @@ def main() -> None:
         command += ["--out", str(Path(scratch) / "out")]
         taken: list[tuple[float, float]] = []
         for _ in range(options.repeats + 1):
-            start = time.perf_counter()
             shown, seconds = watch(command, environment, scratch)
             taken.append(seconds)
         print(shown)

@@ -35,7 +35,10 @@ def fresh():
 def test_a_redrawn_machine_leaves_its_own_residual_around_a_known_effect():
     found = axis()
     drawn = redraw(found, np.random.default_rng(3), 400.0)
-    assert drawn is not None and drawn.distance >= 400.0
+    assert drawn is not None
+    base = np.array([p.off if p.effect else v for p, v in zip(drawn.twin.parameters, drawn.truth, strict=True)])
+    shift = np.subtract(*found.explore.predict(np.array([drawn.truth, base])))
+    assert found.explore.squared_distance(found.found.null, found.explore.whiten(shift)) >= 400.0
     moved = [p.effect for p, v in zip(drawn.twin.parameters, drawn.truth, strict=True) if p.effect and v != p.off]
     assert set(moved) == {drawn.effect}
     signs = set()

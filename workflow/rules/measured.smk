@@ -1,11 +1,13 @@
 # Machines that were really measured: every set of data/measured diagnosed into one page.
 MEASURED = "data/measured"
+CALIBRATIONS = "src/emafault/twins/calibrations"
 
 
 rule diagnose_measured:
     input:
         sets=f"{MEASURED}/sets.yaml",
         nameplate=f"{MEASURED}/nameplate.yaml",
+        calibrations=expand(f"{CALIBRATIONS}/{{twin}}.json", twin=glob_wildcards(f"{CALIBRATIONS}/{{twin}}.json").twin),
         files=[
             f"{MEASURED}/{path}"
             for path in glob_wildcards(f"{MEASURED}/{{path}}").path

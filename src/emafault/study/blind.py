@@ -20,9 +20,8 @@ from ..gap.run import diagnose_recordings
 from ..recording import replace_atomically
 from ..withheld.benches import make_cases
 from ..withheld.cases import draw_case
-from .curves import fit_gap, fit_right
+from .curves import DETECTABLE, fit_gap, fit_right
 
-DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
 FIELDS = [f.name for f in fields(Evidence)]
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000

@@ -12,8 +12,7 @@ from ..gap.diagnose import Diagnosis
 from ..twins.diagnosed import NAMED, diagnose_twin, same_trace
 from ..twins.library import SHARED, measured_twins
 from ..twins.redrawn import redraw
-from .blind import DETECTABLE
-from .curves import fit_right
+from .curves import DETECTABLE, fit_right
 from .measured import write_json
 
 
@@ -71,15 +70,15 @@ def machines(listed: Path, calibration: Calibration) -> dict[str, list[Diagnosis
 
 def redrawings(name: str, machines: Sequence[Diagnosis], draws: int, seed: int) -> list[Redrawing]:
     """Diagnoses of a twin's redrawn machines, two of each draw; what shows no candidate has nothing to tell."""
-    rng = np.random.default_rng([seed, *name.encode()])
+    rng, prior = np.random.default_rng([seed, *name.encode()]), Calibration.load(UNCALIBRATED)
     out = []
     for _ in range(draws if machines else 0):
         drawn = redraw(machines[int(rng.integers(len(machines)))], rng, DETECTABLE)
         if drawn is None:
             continue
-        whole = diagnose_twin(drawn.twin, Calibration.load(UNCALIBRATED))
+        whole = diagnose_twin(drawn.twin, prior)
         alike = same_trace(whole, drawn.effect)
-        left = diagnose_twin(drawn.twin.without(*sorted(alike)), Calibration.load(UNCALIBRATED))
+        left = diagnose_twin(drawn.twin.without(*sorted(alike)), prior)
         for known, found in ((alike, whole), (set[str](), left)):
             if found.found.candidates:
                 sets = found.decision.group or found.found.candidates[:1]

@@ -7,6 +7,7 @@ from scipy.optimize import minimize
 
 from ..gap.decide import Calibration
 
+DETECTABLE = 25.0  # squared distance from which a gap, or a member of it, could have been seen
 SURE = 0.9  # probability from which the second curve is taken at the share of its cases that were right
 PRIOR_WIDTH = 3.0  # of a coefficient about that of the uncalibrated curves
 #: which way gain and excess of the null count for a gap; and gain, both shares left, and margin for the first set

@@ -125,24 +125,24 @@ def check_left_out(name: str, case: str, arrays: Arrays, calibration: Calibratio
 def same_trace(whole: Diagnosis, effect: str) -> set[str]:
     """An effect with what leaves the same trace: where it is left out, a stand-in would be no wrong name.
 
-    That are effects with nearly its signature, and two that together leave what was fitted of it, so that these data
-    cannot tell (three channels' gains are the mean's and two).
+    Such are effects with nearly its signature, and two that together leave what was fitted of it, so that these data
+    cannot tell (one channel's gain is the other two's and the mean's).
     """
     problem, null, singles = whole.explore, whole.found.null, whole.found.singles
     cosines = confusability(problem, null, singles)
     out = {effect} | {e for pair, c in cosines.items() if effect in pair and c > NEIGHBOUR for e in pair}
-    signatures = {c.effects[0]: problem.whiten(c.signature) for c in singles if np.any(c.signature)}
     fitted = next((c for c in whole.found.candidates if c.effects == (effect,)), None)
     if fitted is None:
         return out
     trace = problem.whiten(fitted.point.prediction - null.prediction)
+    open_trace = problem.projected(null, trace)
+    whitened = {c.effects[0]: problem.whiten(c.signature) for c in singles if np.any(c.signature)}
+    projected = {effect: problem.projected(null, signature) for effect, signature in whitened.items()}
     specified = [bool(problem.parameters[m].specified) for m in problem.nuisances]
     nuisances = (problem.whiten(null.jacobian) * problem.sd[list(problem.nuisances)])[:, specified]
-    for pair in combinations(sorted(set(signatures) - out), 2):
-        span = np.concatenate([signatures[e] for e in pair], axis=1)
-        dual = problem.projected(null, span)
-        rest = trace - span @ np.linalg.lstsq(span.T @ dual, dual.T @ trace, rcond=1e-9)[0]
-        left = problem.projected(null, rest)
+    for pair in combinations(sorted(set(whitened) - out), 2):
+        span, dual = (np.concatenate([of[e] for e in pair], axis=1) for of in (whitened, projected))
+        left = open_trace - dual @ np.linalg.lstsq(span.T @ dual, dual.T @ trace, rcond=1e-9)[0]
         # what it takes of a nuisance that nothing specifies is its prior's saying, not the data's
         if np.square(left).sum() + np.square(nuisances.T @ left).sum() < GROUP_DISTANCE:
             out |= set(pair)

@@ -23,7 +23,6 @@ class Redrawn:
     twin: MeasuredTwin
     effect: str
     truth: np.ndarray  # (parameter,) of the twin
-    distance: float  # squared, from the base model
 
 
 def redraw(machine: Diagnosis, rng: np.random.Generator, least: float) -> Redrawn | None:
@@ -50,8 +49,7 @@ def redraw(machine: Diagnosis, rng: np.random.Generator, least: float) -> Redraw
         truth = base.copy()
         truth[problem.effect_parameters(hypothesis)] = draw_parameters(machine, hypothesis, rng)
         explored = problem.predict(np.array([base, truth]))
-        distance = problem.squared_distance(null, problem.whiten(explored[1] - explored[0]))
-        if distance >= least:
+        if problem.squared_distance(null, problem.whiten(explored[1] - explored[0])) >= least:
             break
     else:
         return None
@@ -60,7 +58,7 @@ def redraw(machine: Diagnosis, rng: np.random.Generator, least: float) -> Redraw
     for name, block in twin.blocks.items():
         before, known = twin.predict(np.array([fitted, truth]), [name])
         blocks[name] = replace(block, observed=known + sign * (block.observed - before))
-    return Redrawn(replace(twin, blocks=blocks), hypothesis.effect, truth, distance)
+    return Redrawn(replace(twin, blocks=blocks), hypothesis.effect, truth)
 
 
 def draw_parameters(machine: Diagnosis, hypothesis: Hypothesis, rng: np.random.Generator) -> np.ndarray:
