@@ -78,6 +78,15 @@ def simulate_each(
     return [{name: values[r, :n] for name, values in out.items()} for r, n in enumerate(records)]
 
 
+def ways(runs: np.ndarray) -> np.ndarray:
+    """(run,) the way each takes: 0 in the lanes, 1 in them with extras, 2 segment by segment.
+
+    Those of one way go best together: extras hold up the lanes beside them.
+    """
+    extras = np.array([has_extras(run) for run in attributed(runs)], int)
+    return np.where(runs["compliance_K"] > 0.0, 2, extras)
+
+
 def _run(
     runs: np.ndarray, command: np.ndarray, interval: np.ndarray, records: np.ndarray, threads: int = 1
 ) -> dict[str, np.ndarray]:
@@ -90,10 +99,10 @@ def _run(
     pieces = np.split(np.empty(ends[-1]), ends[:-1])
     out = {name: piece.reshape(s) for name, piece, s in zip(SIGNALS, pieces, shapes, strict=True)}
     given = attributed(runs)
-    # extras hold up the lanes beside them, but less than lanes left empty
-    extras = np.array([has_extras(run) for run in given]) & (len(runs) > LANES)
+    # lanes left empty would cost more than those held up
+    way = ways(runs) if len(runs) > LANES else np.zeros(len(runs), int)
     parts = []
-    for alike in (np.flatnonzero(~extras), np.flatnonzero(extras)):
+    for alike in (np.flatnonzero(way == w) for w in range(3)):
         shares = min(4 * threads, -(-len(alike) // LANES)) if threads > 1 else 1
         parts += [rows for rows in np.array_split(alike, max(1, shares)) if len(rows)]
 

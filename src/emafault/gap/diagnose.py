@@ -229,7 +229,7 @@ def fault_vectors(
 def biased(before: Mapping[str, dict], after: Mapping[str, dict]) -> dict[str, float]:
     """Component -> mean estimate before less after, where it is more than a quarter of the interval."""
     out = {}
-    for component in {c for f in before.values() for c in f}:
+    for component in dict.fromkeys(c for f in before.values() for c in f):
         shifts = [f[component]["value"] - after[n][component]["value"] for n, f in before.items() if component in f]
         widths = [after[n][component]["high"] - after[n][component]["low"] for n, f in before.items() if component in f]
         if abs(np.mean(shifts)) > 0.25 * np.mean(widths):

@@ -1,6 +1,6 @@
 """Fits of the empty set and of candidate sets to a part of a bench; the arithmetic is that of ``gaussian``."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -207,24 +207,58 @@ class Problem(Gaussian):
         self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int = 2, renew: bool = True
     ) -> Candidate:
         """Refit a candidate with the simulator: true prediction, effect derivatives renewed on the way."""
+        return self.refine_all(null, [(candidate, rounds)], hypotheses, renew)[0]
+
+    def refine_all(
+        self,
+        null: Point,
+        candidates: Sequence[tuple[Candidate, int]],
+        hypotheses: dict[str, Hypothesis],
+        renew: bool = True,
+    ) -> list[Candidate]:
+        """Refit candidates, each in so many rounds; what each asks for next is simulated side by side."""
+        refits = [self._refit(null, candidate, hypotheses, rounds, renew) for candidate, rounds in candidates]
+        asked = {n: next(refit) for n, refit in enumerate(refits)}
+        done: dict[int, Candidate] = {}
+        while asked:
+            predictions = self.predict(np.concatenate(list(asked.values())))
+            ends = np.cumsum([len(points) for points in asked.values()])
+            answers = zip(list(asked), np.split(predictions, ends[:-1]), strict=True)
+            for n, answer in answers:
+                try:
+                    asked[n] = refits[n].send(answer)
+                except StopIteration as end:
+                    del asked[n]
+                    done[n] = end.value
+        return [done[n] for n in range(len(refits))]
+
+    def _refit(
+        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int, renew: bool
+    ) -> Generator[np.ndarray, np.ndarray, Candidate]:
+        """The refit of one candidate: yields (point, parameter), is sent their predictions (point, statistic)."""
         chosen = [hypotheses[e] for e in candidate.effects]
         own, widened = self.freed(chosen)
         free = [*self.nuisances, *own]
         jacobian = candidate.point.jacobian.copy()
         jacobian[:, : len(self.nuisances)] = null.jacobian
         both = np.array([candidate.point.values, candidate.start])
-        starts = [self.point(v, y, jacobian, free, widened) for v, y in zip(both, self.predict(both), strict=True)]
+        predictions = yield both
+        starts = [self.point(v, y, jacobian, free, widened) for v, y in zip(both, predictions, strict=True)]
         best = min(starts, key=lambda point: point.objective)
         for round_ in range(rounds):
             if own and renew and round_ in (0, 2):
+                points, steps = self._effect_steps(best, own)
+                predictions = yield points
                 jacobian = jacobian.copy()
-                jacobian[:, len(self.nuisances) :] = self._effect_columns(best, own)
+                jacobian[:, len(self.nuisances) :] = self.seen(predictions - best.prediction).T / steps
                 best = self.point(best.values, best.prediction, jacobian, free, widened)
             moved = self.solve(best.values, best.prediction, jacobian, free, widened)
-            trial = self.point(moved, self.predict(moved)[0], jacobian, free, widened)
+            predictions = yield moved[None]
+            trial = self.point(moved, predictions[0], jacobian, free, widened)
             if trial.objective > best.objective:
                 halfway = 0.5 * (best.values + moved)
-                trial = self.point(halfway, self.predict(halfway)[0], jacobian, free, widened)
+                predictions = yield halfway[None]
+                trial = self.point(halfway, predictions[0], jacobian, free, widened)
             done = trial.objective > best.objective - 0.2
             if trial.objective < best.objective:
                 best = trial
@@ -254,13 +288,13 @@ class Problem(Gaussian):
         """(statistic, own) differences by the parameters of effects, simulated at a fit."""
         if not own:
             return np.zeros((len(self.cells), 0))
-        steps, points = [], []
-        for m in own:
-            step = self.parameters[m].step
-            if at.values[m] + step > self.high[m]:
-                step = -step
-            point = at.values.copy()
-            point[m] += step
-            steps.append(step)
-            points.append(point)
-        return self.seen(self.predict(np.array(points)) - at.prediction).T / np.array(steps)
+        points, steps = self._effect_steps(at, own)
+        return self.seen(self.predict(points) - at.prediction).T / steps
+
+    def _effect_steps(self, at: Point, own: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Points (own, parameter) a step from a fit by each parameter of effects, and the steps (own,)."""
+        points = np.tile(at.values, (len(own), 1))
+        steps = np.array([self.parameters[m].step for m in own])
+        steps[at.values[list(own)] + steps > self.high[list(own)]] *= -1.0
+        points[np.arange(len(own)), list(own)] += steps
+        return points, steps

@@ -136,26 +136,27 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     singles = sorted(best_of.values(), key=lambda c: -c.gain)
     tried: dict[tuple[str, ...], Candidate] = {}
 
-    def accept(candidate: Candidate) -> None:
-        key = tuple(sorted(candidate.effects))
-        if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
-            return
-        if not _of_size(problem, candidate, by_id):
-            return
-        if key not in tried or candidate.gain > tried[key].gain:
-            tried[key] = candidate
+    def accept(candidates: Iterable[Candidate]) -> None:
+        for candidate in candidates:
+            key = tuple(sorted(candidate.effects))
+            if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
+                continue
+            if not _of_size(problem, candidate, by_id):
+                continue
+            if key not in tried or candidate.gain > tried[key].gain:
+                tried[key] = candidate
 
-    count = 0
+    count, promising = 0, []
     for candidate in sorted(screened, key=lambda c: -c.gain):
         if candidate.gain < HOPELESS or count >= REFINED_SINGLES + 3:
             break
         effect = candidate.effects[0]
         if count >= REFINED_SINGLES and candidate.gain < 0.5 * singles[0].gain:
             break
-        rounds = 3 if candidate.gain > 0.5 * singles[0].gain else 2
-        accept(problem.refine(null, candidate, by_id, rounds))
+        promising.append((candidate, 3 if candidate.gain > 0.5 * singles[0].gain else 2))
         # every start of the leading effect is followed: a linearised gain does not tell a good start from a bad one
         count += effect != singles[0].effects[0]
+    accept(problem.refine_all(null, promising, by_id))
     beam = _best(tried, 1)[:2]
     for round_ in range(REBASES):
         if not beam or beam[0].gain < STRONG:
@@ -163,10 +164,11 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         before = beam[0].point.misfit
         null = problem.rebase(null, beam[0])
         kept, tried = _best(tried, 1), {}
-        for candidate in kept[:4]:
-            first = candidate is kept[0]
-            if first or candidate.gain > 0.2 * kept[0].gain or (candidate is kept[1] and round_ == 0):
-                accept(problem.refine(null, candidate, by_id, 4 if first else 2))
+        again = [(kept[0], 4)]
+        for candidate in kept[1:4]:
+            if candidate.gain > 0.2 * kept[0].gain or (candidate is kept[1] and round_ == 0):
+                again.append((candidate, 2))
+        accept(problem.refine_all(null, again, by_id))
         beam = _best(tried, 1)[:2]
         if not beam or beam[0].point.misfit > 0.8 * before or beam[0].point.misfit < 1.2 * len(problem.cells):
             break
@@ -175,15 +177,14 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         if not grown:
             break
         known = set(tried)
-        for candidate in grown:
-            accept(problem.refine(null, candidate, by_id, 3))
+        accept(problem.refine_all(null, [(candidate, 3) for candidate in grown], by_id))
         new = [c for k, c in tried.items() if k not in known]
         if not new:
             break
         top = max(new, key=lambda c: c.gain)
         if beam and top.gain > beam[0].gain + addition and not beam[0].polished:
             # what a set lacks in convergence is not to be had by one more effect
-            accept(problem.polish(null, beam[0], by_id))
+            accept([problem.polish(null, beam[0], by_id)])
             beam = _best(tried, size - 1)[:2]
         if beam and top.gain < beam[0].gain + addition:
             break
@@ -386,6 +387,7 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
     the others on their way."""
     best = max(tried.values(), key=lambda c: c.gain, default=None)
     while best is not None and len(best.effects) > 1:
+        smaller = []
         for effect in best.effects:
             kept = tuple(e for e in best.effects if e != effect)
             chosen = [by_id[e] for e in kept]
@@ -395,7 +397,8 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
                 begin[m] = problem.mean[m] if by_id[effect].kind == "calibration" else problem.parameters[m].off
             signature = best.point.jacobian[:, [best.point.free.index(m) for m in own]]
             candidate = problem.linear(null, chosen, begin, problem.predict(begin)[0], signature)
-            accept(problem.refine(null, candidate, by_id, 2))
+            smaller.append((candidate, 2))
+        accept(problem.refine_all(null, smaller, by_id))
         top = max(tried.values(), key=lambda c: c.gain)
         if top is best:
             return

@@ -11,7 +11,7 @@ from ..actuator.commands import jumps_of, resample, with_corners
 from ..actuator.conduction import LANES
 from ..actuator.parameters import RUN_DTYPE, ActuatorParameters, make_runs
 from ..actuator.sensors import SensorNoise
-from ..actuator.simulate import simulate_each
+from ..actuator.simulate import simulate_each, ways
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
 from ..gap.twin import Cell
@@ -261,8 +261,10 @@ class ActuatorTwin:
 
     def _statistics(self, tasks: Sequence[_Task]) -> list[np.ndarray]:
         """(statistic,) statistics of every task's run as they compare with its recording's."""
-        # runs go side by side, best with those that are as long
-        order = sorted(range(len(tasks)), key=lambda n: len(self._brought[tasks[n].name].recording.time))
+        # runs go side by side, best with those that take the same way and are as long
+        runs = np.array([t.run for t in tasks], RUN_DTYPE)
+        lengths = [len(self._brought[t.name].recording.time) for t in tasks]
+        order = np.lexsort((lengths, ways(runs))).tolist()
         parts = [order[at : at + LANES] for at in range(0, len(order), LANES)]
 
         def work(part: list[int]) -> list[np.ndarray]:
