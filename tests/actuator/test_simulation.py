@@ -13,7 +13,7 @@ from emafault.actuator.commands import command_positions, jumps_of
 from emafault.actuator.conduction import LANES, NEVER, passing
 from emafault.actuator.lane import stays_off
 from emafault.actuator.parameters import make_runs
-from emafault.actuator.simulate import simulate, simulate_each
+from emafault.actuator.simulate import simulate, simulate_each, ways
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 
@@ -67,6 +67,8 @@ def test_each_run_is_the_same_among_runs_of_other_lengths_commands_and_effects()
     effects = {name: {p: 0.5 * (q.low + q.high) for p, q in e.parameters.items()} for name, e in EFFECTS.items()}
     runs = np.concatenate([make_runs(ACTUATOR, FAULT, effects={name: e}) for name, e in effects.items()])
     assert len(runs) > 2 * LANES
+    way = dict(zip(effects, ways(runs), strict=True))
+    assert (way["compliance"], way["inductance_saturation"], way["cogging"]) == (2, 1, 0)
     duration = 0.05 + 0.002 * np.arange(len(runs))
     interval = np.array([5e-5, 1.3e-4, 2e-4, 1e-3])[np.arange(len(runs)) % 4]
     records = [int(d / i) for d, i in zip(duration, interval)]

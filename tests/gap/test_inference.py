@@ -337,6 +337,28 @@ class Alike(Lines):
         return super().predict(values, part) + np.array([v[4] ** 5 * x**2 for v in np.atleast_2d(values)])
 
 
+def test_candidates_refitted_together_come_out_as_alone_and_ask_together(monkeypatch):
+    twin = Alike(13, curvature=3.0)
+    problem = Problem(twin, ["one", "two"])
+    null = problem.fit_null()
+    by_id = {h.effect: h for h in twin.hypotheses}
+    given = list(zip(problem.screen(null, twin.hypotheses), (3, 1), strict=True))
+    asked = []
+    predict = twin.predict
+    monkeypatch.setattr(twin, "predict", lambda values, part: asked.append(len(values)) or predict(values, part))
+    alone = [problem.refine(null, candidate, by_id, rounds) for candidate, rounds in given]
+    first = len(asked)
+    together = problem.refine_all(null, given, by_id)
+    assert [c.effects for c in together] == [("curve",), ("bend",)]
+    for one, other in zip(alone, together, strict=True):
+        assert one.gain == other.gain and one.refined
+        np.testing.assert_array_equal(one.point.values, other.point.values)
+        np.testing.assert_array_equal(one.signature, other.signature)
+    assert len(asked) - first < first
+    assert sum(asked[first:]) == sum(asked[:first])
+    assert problem.refine_all(null, [], by_id) == []
+
+
 def test_a_rival_is_not_outdone_for_lack_of_convergence():
     twin = Alike(13, curvature=3.0)
     problem = Problem(twin, ["one", "two"])

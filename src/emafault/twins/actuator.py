@@ -263,7 +263,7 @@ class ActuatorTwin:
         """(statistic,) statistics of every task's run as they compare with its recording's."""
         # runs go side by side, best with those that take the same way and are as long
         runs = np.array([t.run for t in tasks], RUN_DTYPE)
-        lengths = [len(self._brought[t.name].recording.time) for t in tasks]
+        lengths = np.array([len(self._brought[t.name].recording.time) for t in tasks])
         order = np.lexsort((lengths, ways(runs))).tolist()
         parts = [order[at : at + LANES] for at in range(0, len(order), LANES)]
 

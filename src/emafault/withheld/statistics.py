@@ -19,9 +19,8 @@ from ..actuator.sensors import SensorNoise
 from ..actuator.simulate import commanded_position, simulate, simulate_each, time_axis
 from ..effects import EFFECTS
 from .cases import Case, RecordingPlan
+from .sums import ALPHA, CELLS, KINDS, PARTS, TIME_BINS, add_up, weights
 
-ALPHA = np.arange(3) * 2.0 * np.pi / 3.0
-TIME_BINS, ANGLE_BINS = 12, 24
 COARSE = 2e-4  # s, shorter intervals are merged up to it
 MEANS = ("phase_voltage", "phase_current", "rotor_speed", "bus_voltage")
 START, SLOW, MARGIN = 0.05, 3.0, 0.01  # s, rad/s, s
@@ -74,7 +73,8 @@ def runs_of(
 
 def trapezoid(x: np.ndarray) -> np.ndarray:
     """Nominal unit back-EMF at electrical angle x (rad)."""
-    return np.clip(np.abs((x / np.pi - 0.5) % 2.0 - 1.0) * 6.0 - 3.0, -1.0, 1.0)
+    turns = x / (2.0 * np.pi) - 0.25
+    return np.clip(np.abs(turns - np.floor(turns) - 0.5) * 12.0 - 3.0, -1.0, 1.0)
 
 
 def coarser(
@@ -92,31 +92,6 @@ def coarser(
         out[name] = blocks.mean(axis=2) if name in MEANS else blocks[:, :, -1]
     interval = merged * plan.interval
     return replace(plan, interval=interval, duration=samples * interval), out, merged
-
-
-class Sums:
-    """Weighted sums over samples: every row of ``weight`` (cell, time), or one weight (time,) sorted into cells."""
-
-    def __init__(self, weight: np.ndarray, cell: np.ndarray | None = None, cells: int = 0):
-        self.weight, self.cell, self.cells = weight, cell, cells
-
-    def of(self, values: np.ndarray) -> np.ndarray:
-        """(cell,) sums of a feature (time,)."""
-        if self.cell is None:
-            return self.weight @ values
-        return np.bincount(self.cell, self.weight * values, self.cells)
-
-    def power(self) -> np.ndarray:
-        """(cell,) sums of squared weights."""
-        if self.cell is None:
-            return np.sum(self.weight**2, axis=1)
-        return np.bincount(self.cell, self.weight**2, self.cells)
-
-    def dense(self) -> np.ndarray:
-        """(cell, time) weights."""
-        if self.cell is None:
-            return self.weight
-        return (self.cell == np.arange(self.cells)[:, None]) * self.weight
 
 
 class View:
@@ -148,61 +123,25 @@ class View:
             self.kinds += ["lag", "current_0", "current_1", "current_2"]
         if case.bus_voltage:
             self.kinds.append("bus")
-        self.counts, self.rows = {}, {}
-        for kind, sums in self._sums(truth, 0).items():
-            rows = np.concatenate([part.dense() for part in sums])
-            self.counts[kind] = np.sqrt(np.sum(rows**2, axis=1))
-            self.rows[kind] = rows * self._scale(kind, np.sum(rows**2, axis=1))[:, None]
+        rows = weights(*self._visits(truth, 0))
+        power = np.sum(rows**2, axis=1)
+        self.count = np.sqrt(power)
+        rows *= self._scale(power)[:, None]
+        self.rows = {kind: rows[PARTS[kind]] for kind in self.kinds}
         self.factors: dict[str, np.ndarray] = {}
 
-    def _sums(self, signals: Mapping[str, np.ndarray], run: int) -> "dict[str, list[Sums]]":
-        """Which samples each statistic adds up, with what weight."""
+    def _visits(self, signals: Mapping[str, np.ndarray], run: int) -> tuple:
+        """What ``sums.add_up`` and ``sums.weights`` ask of a run: where its samples are."""
         theta, speed = signals["rotor_angle"][run], signals["rotor_speed"][run]
         middle = theta - 0.5 * speed * self.plan.interval
-        forward, fast = speed > 0.0, np.abs(speed) > self.half_speed
         # break-away and standstill are left out: there a small cause decides when motion sets in
         still = uniform_filter1d(((np.abs(speed) < SLOW) | ~self.late).astype(float), 2 * self.reach + 1)
-        moving = still < 1e-9
-        some = moving.astype(float)
-        thirds = self.time_bin * 3 // TIME_BINS + 3 * forward
-        turn = np.exp(1j * middle)
-        turn_8 = _squared(turn, 3)
-        turn_24 = turn_8 * turn_8 * turn_8
-        turn_72 = turn_24 * turn_24 * turn_24
-        # orders 72, 144, 24 and 1
-        waves = [g * some for wave in (turn_72, turn_72 * turn_72, turn_24, turn) for g in (wave.real, wave.imag)]
-        electrical = np.exp(1j * self.actuator.pole_pairs * middle)
-        in_time = Sums(some, self.time_bin, TIME_BINS)
-        sums = {
-            "bus": [Sums(np.ones_like(speed), self.time_bin, TIME_BINS)],
-            "mismatch": [in_time],
-            "twist": [Sums(some, thirds, 6)],
-            "torque": [in_time, Sums(np.array(waves))],
-            "lag": [Sums(some[None])],
-        }
-        for j in range(3):
-            x = (self.actuator.pole_pairs * middle - ALPHA[j]) % (2.0 * np.pi)
-            cell = np.minimum((x / (2.0 * np.pi) * ANGLE_BINS).astype(int), ANGLE_BINS - 1)
-            cell += ANGLE_BINS * forward + 2 * ANGLE_BINS * fast
-            f = trapezoid(x)
-            swing = [f * speed * turn.real * some, f * speed * turn.imag * some]
-            wave = electrical * np.exp(-1j * ALPHA[j])
-            wave_2, wave_5 = wave * wave, wave * _squared(wave, 2)
-            orders = [np.ones_like(x), *(g for w in (wave, wave_2, wave_5, wave_5 * wave_2) for g in (w.real, w.imag))]
-            both = np.array([o * some * way for way in (forward, ~forward) for o in orders])
-            sums[f"current_{j}"] = [Sums(both)]
-            sign = np.sign(np.where(np.abs(f) > 0.9, f * speed, 0.0)) * some
-            sums[f"voltage_{j}"] = [
-                Sums(some, cell, 4 * ANGLE_BINS),
-                Sums(sign, self.time_bin, TIME_BINS),
-                Sums(np.array(swing)),
-            ]
-        return {kind: sums[kind] for kind in self.kinds}
+        some = (still < 1e-9).astype(float)
+        return middle, np.ascontiguousarray(speed), some, self.time_bin, self.actuator.pole_pairs, self.half_speed
 
-    def _scale(self, kind: str, power: np.ndarray) -> np.ndarray:
+    def _scale(self, power: np.ndarray) -> np.ndarray:
         """Factors that count a cell's mean by the visits that the recording itself paid to it."""
-        count = self.counts[kind]
-        return (count**2 > MIN_VISITS) * count / (power + 0.5)
+        return (self.count**2 > MIN_VISITS) * self.count / (power + 0.5)
 
     def features(self, signals: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Per-sample features (run, time) of signals with a run axis."""
@@ -238,22 +177,24 @@ class View:
             "lag": (asked - change) * bend / (np.mean(bend**2, axis=1, keepdims=True) + 1e-9),
             "bus": signals["bus_voltage"],
         }
+        electrical = np.exp(1j * a.pole_pairs * middle)
+        carried = turning / (2.0 * a.back_emf)
         for j in range(3):
             # which phases carry the current, apart from how much of it there is
-            out[f"current_{j}"] = i[..., j] - _block(a.pole_pairs * middle - ALPHA[j]) * turning / (2.0 * a.back_emf)
+            out[f"current_{j}"] = i[..., j] - _block(electrical * np.exp(-1j * ALPHA[j])) * carried
             out[f"voltage_{j}"] = residual[..., j]
         return out
 
     def statistics(self, signals: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """(run, statistic) of each kind."""
         features = self.features(signals)
-        out: dict[str, list[np.ndarray]] = {kind: [] for kind in self.kinds}
-        for run in range(len(signals["rotor_speed"])):
-            for kind, sums in self._sums(signals, run).items():
-                values = np.concatenate([part.of(features[kind][run]) for part in sums])
-                power = np.concatenate([part.power() for part in sums])
-                out[kind].append(self._scale(kind, power) * values)
-        return {kind: np.array(values) for kind, values in out.items()}
+        ordered = np.stack([features[kind] for kind in KINDS], axis=1)
+        values = np.zeros((len(ordered), CELLS))
+        for run in range(len(ordered)):
+            power = np.zeros(CELLS)
+            add_up(*self._visits(signals, run), ordered[run], values[run], power)
+            values[run] *= self._scale(power)
+        return {kind: values[:, PARTS[kind]] for kind in self.kinds}
 
     def prepare(self, scatter: Mapping[str, float]) -> None:
         """Noise covariance of each kind; ``scatter`` is the variance from switching (the same physics twice)."""
@@ -287,24 +228,17 @@ class View:
         return np.concatenate(parts, axis=1)
 
 
-def _squared(x: np.ndarray, times: int) -> np.ndarray:
-    """x squared again and again."""
-    for _ in range(times):
-        x = x * x
-    return x
-
-
 def less(statistics: Mapping[str, np.ndarray], base: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Statistics less those of one run."""
     return {kind: values - base[kind] for kind, values in statistics.items()}
 
 
-def _block(x: np.ndarray) -> np.ndarray:
-    """First harmonics of a six-step current at electrical angle x (rad)."""
-    out = np.zeros_like(x)
-    for n in (1, 5, 7):
-        out += 4.0 / (n * np.pi) * np.cos(n * np.pi / 6.0) * np.sin(n * x)
-    return out
+def _block(wave: np.ndarray) -> np.ndarray:
+    """First harmonics of a six-step current where its phase's electrical angle is that of ``wave`` (complex)."""
+    wave_2 = wave * wave
+    wave_5 = wave * wave_2 * wave_2
+    orders = ((1, wave), (5, wave_5), (7, wave_5 * wave_2))
+    return sum((4.0 / (n * np.pi) * np.cos(n * np.pi / 6.0) * w.imag for n, w in orders), np.zeros(wave.shape))
 
 
 def _smooth(x: np.ndarray, reach: int) -> np.ndarray:
