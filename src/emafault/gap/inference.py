@@ -204,20 +204,19 @@ class Problem(Gaussian):
         return Candidate(effects, fitted, fitted.log_evidence - null.log_evidence, False, begin, signature)
 
     def refine(
-        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int = 2, renew: bool = True
+        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int = 2
     ) -> Candidate:
         """Refit a candidate with the simulator: true prediction, effect derivatives renewed on the way."""
-        return self.refine_all(null, [(candidate, rounds)], hypotheses, renew)[0]
+        return self.refine_all(null, [(candidate, rounds)], hypotheses)[0]
 
     def refine_all(
         self,
         null: Point,
         candidates: Sequence[tuple[Candidate, int]],
         hypotheses: dict[str, Hypothesis],
-        renew: bool = True,
     ) -> list[Candidate]:
         """Refit candidates, each in so many rounds; what each asks for next is simulated side by side."""
-        refits = [self._refit(null, candidate, hypotheses, rounds, renew) for candidate, rounds in candidates]
+        refits = [self._refit(null, candidate, hypotheses, rounds) for candidate, rounds in candidates]
         asked = {n: next(refit) for n, refit in enumerate(refits)}
         done: dict[int, Candidate] = {}
         while asked:
@@ -233,7 +232,7 @@ class Problem(Gaussian):
         return [done[n] for n in range(len(refits))]
 
     def _refit(
-        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int, renew: bool
+        self, null: Point, candidate: Candidate, hypotheses: dict[str, Hypothesis], rounds: int
     ) -> Generator[np.ndarray, np.ndarray, Candidate]:
         """The refit of one candidate: yields (point, parameter), is sent their predictions (point, statistic)."""
         chosen = [hypotheses[e] for e in candidate.effects]
@@ -246,7 +245,7 @@ class Problem(Gaussian):
         starts = [self.point(v, y, jacobian, free, widened) for v, y in zip(both, predictions, strict=True)]
         best = min(starts, key=lambda point: point.objective)
         for round_ in range(rounds):
-            if own and renew and round_ in (0, 2):
+            if own and round_ in (0, 2):
                 points, steps = self._effect_steps(best, own)
                 predictions = yield points
                 jacobian = jacobian.copy()
