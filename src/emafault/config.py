@@ -16,6 +16,7 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from . import checks, schema
+from .effects import EFFECTS
 from .errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -339,21 +340,29 @@ def _of_rung(value: Any, rung: str) -> int:
 
 
 def withheld_jobs(draw: str) -> list[tuple[str, int]]:
-    """(rung, batch) of every job of a draw."""
+    """(rung, batch) of every job of a draw; T3 is made by the jobs of T1, whose benches it diagnoses."""
     read = _withheld_draw(draw)
-    return [
-        (rung, n) for rung, cases in read["cases"].items() for n in range(-(-cases // _of_rung(read["batch"], rung)))
-    ]
+    cases = {rung: count for rung, count in read["cases"].items() if rung != "T3"}
+    return [(rung, n) for rung, count in cases.items() for n in range(-(-count // _of_rung(read["batch"], rung)))]
 
 
 def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
-    """What one job of blind cases reads: its seeds, the actuator and the sensors."""
+    """What one job of blind cases reads: its seeds, the actuator and the sensors.
+
+    ``again`` are those of T1 that T3 diagnoses too: whole rounds of the effects, spread over the draw.
+    """
     read = _withheld_draw(draw)
     origin, size = _of_rung(read["first_seed"], rung), _of_rung(read["batch"], rung)
     first = origin + batch * size
     last = min(first + size, origin + read["cases"][rung])
     config = compose()
-    seeds = {"rung": rung, "first": first, "last": last}
+    again = []
+    if rung == "T1":
+        effects, cases = len(EFFECTS), read["cases"]
+        apart = max(1, cases["T1"] // max(cases["T3"], 1))  # rounds from one that T3 takes to the next
+        taken = [origin + effects * apart * (n // effects) + n % effects for n in range(cases["T3"])]
+        again = [seed for seed in taken if first <= seed < last]
+    seeds = {"rung": rung, "first": first, "last": last, "again": again}
     return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
 
 

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from emafault.gap.decide import MOST, share_left
+from emafault.gap.decide import share_left
 from emafault.gap.held_out import claim
+from emafault.gap.which import MOST
 
 
 def verdict():

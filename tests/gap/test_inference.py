@@ -5,12 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.gap.decide import MOST, UNCALIBRATED, Calibration, decide, evidence_of, share_left
+from emafault.gap.decide import UNCALIBRATED, Calibration, decide, evidence_of, share_left
 from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
-from emafault.gap.which import SPECIFICATION, _fitted_alike, families, groups, left_where_acting, search
+from emafault.gap.which import (
+    MOST,
+    SPECIFICATION,
+    _fitted_alike,
+    families,
+    groups,
+    left_where_acting,
+    outside,
+    search,
+)
 
 
 class Lines:
@@ -125,6 +134,43 @@ def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
     assert all(f.label != "unit.slope" for f in widened)
     decision = decide(problem, found, twin.hypotheses, Calibration.load())
     assert decision.verdict == "unknown"
+
+
+class Precise(Lines):
+    """Recordings that tell the slope far better than its specification does."""
+
+    sigma = 0.01
+
+    def __init__(self, slope, **truth):
+        super().__init__(6, **truth)
+        self.parameters[1] = Parameter("unit.slope", "1", slope, slope, 0.02, -5, 5, 0.01, specified="line")
+        self.hypotheses.append(Hypothesis("slope", ("line",), ("unit.slope",), (), "calibration"))
+
+
+@pytest.mark.parametrize("remainder", [0.0, 0.03, 0.06])
+def test_a_unit_far_outside_its_specification_is_named_beside_a_remainder(remainder):
+    twin = Precise(0.8, outside=remainder)  # the recordings' slope is 1.2; the null has it, and is pulled a little
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    decision = decide(problem, found, twin.hypotheses, Calibration.load())
+    assert decision.verdict == ("partly" if remainder else "explained")
+    first = found.candidates[0]
+    assert first.effects == ("slope",) and found.within.values[1] == 0.8
+    # the gain and the share left count from there, not from the null, which has taken the slope up
+    assert first.gain < 300.0 < 10_000.0 < decision.evidence.gain
+    assert decision.evidence.unexplained < 0.05
+    if remainder == 0.06:
+        assert problem.excess(first.point) > MOST * problem.excess(found.null)
+        rival = next(c for c in found.candidates if c.effects == ("step",))
+        assert outside(problem, rival.point, {h.effect: h for h in twin.hypotheses}) == ["slope"]
+
+
+def test_a_unit_outside_its_specification_is_not_named_where_it_is_little_of_the_gap():
+    twin = Precise(1.11, outside=0.3)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    assert "slope" not in found.candidates[0].effects and found.within is found.null
+    assert decide(problem, found, twin.hypotheses, Calibration.load()).verdict == "unknown"
 
 
 @pytest.mark.parametrize("other_form", [0.0, 0.9])

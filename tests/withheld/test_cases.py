@@ -18,7 +18,7 @@ from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.recording import read_recording
 from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth
-from emafault.withheld.cases import STRATA, case_from_dict, draw_case, stratum_of
+from emafault.withheld.cases import RUNGS, STRATA, case_from_dict, draw_case, stratum_of
 from emafault.withheld.detectability import Detector
 
 NOISE = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
@@ -54,6 +54,14 @@ def test_a_case_is_its_seed(rung):
     assert case == draw_case(rung, 137)
     assert case != draw_case(rung, 138)
     assert case_from_dict(json.loads(json.dumps(case.to_dict()))) == case
+
+
+def test_what_is_left_out_on_t3_is_in_the_bench_of_t1():
+    shown, left_out = draw_case("T1", 137), draw_case("T3", 137)
+    assert left_out.left_out == tuple(shown.effects) and shown.left_out == ()
+    assert left_out.recordings == shown.recordings and left_out.unit() == shown.unit()
+    assert left_out.noise_seed == shown.noise_seed
+    assert len({draw_case(rung, 137).noise_seed for rung in RUNGS}) == len(RUNGS) - 1
 
 
 def test_seeds_go_through_effects_and_amplitudes():

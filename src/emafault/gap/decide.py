@@ -17,12 +17,11 @@ from ..errors import InputError
 from .how_far import square_error
 from .inference import Candidate, Problem
 from .twin import Hypothesis
-from .which import Search, far_outside, groups, left_where_acting
+from .which import MOST, Search, far_outside, groups, left_where_acting, outside, unexplained
 
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration
 UNCALIBRATED = Path(__file__).with_name("uncalibrated.json")
-MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
 AMPLE = 1000.0  # of log evidence or excess: what is more says no more
 WITHDRAWN = 0.2  # the most that is believed of a set that leaves more, or has no evidence over the empty one
 
@@ -67,10 +66,10 @@ def saturating(x: float) -> float:
 class Evidence:
     """What the curves see of a search."""
 
-    gain: float  # of the best set over the empty set, in log evidence
+    gain: float  # of the best set over the empty set, its calibration effects at their specification; log evidence
     null_excess: float  # largest family excess of the null fit
     excess: float  # largest family excess that the best set leaves
-    unexplained: float  # share of the null's excess that the best set leaves
+    unexplained: float  # share of that one's excess that the best set leaves
     acting: float  # share of the misfit left in the kinds of statistics that the best set acts on
     margin: float  # gain over the best rival outside the group
     dof: int
@@ -103,17 +102,20 @@ def evidence_of(problem: Problem, found: Search, hypotheses: Sequence[Hypothesis
     best = found.candidates[0]
     inside = {c.effects for c in group}
     names = set(best.effects)
+    # all gains are over the null, in which a calibration effect is but for the pull of its specification
+    pulled = found.null.log_evidence - found.within.log_evidence
     rivals = [
-        c.gain
+        c.gain + pulled
         for c in found.candidates
-        if c.effects not in inside and not (set(c.effects) > names or set(c.effects) < names)
+        if c.effects not in inside
+        and not ({*c.effects, *outside(problem, c.point, by_id)} > names or set(c.effects) < names)
     ]
-    margin = best.gain - max([*rivals, 0.0])
-    before, after = problem.excess(found.null), problem.excess(best.point)
-    unexplained = float(np.clip(max(after, 0.0) / max(before, 1.0), 0.0, 1.0))
+    gain = best.gain + pulled
+    margin = gain - max([*rivals, 0.0])
+    share = unexplained(problem, found.within, best.point)
     _, widened = problem.freed([by_id[e] for e in best.effects])
     acting = left_where_acting(problem, found.null, best.point, widened)
-    return Evidence(best.gain, null_excess, found.families[0].excess, unexplained, acting, margin, dof), group
+    return Evidence(gain, null_excess, found.families[0].excess, share, acting, margin, dof), group
 
 
 def share_left(recalibrated: float, after: float, size: int) -> float | None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from .diagnose import Diagnosis
 from .how_far import own_nuisances, refit
+from .which import outside
 
 RIVALS = 12
 VISIBLE = 1.3  # root mean square from which a misfit on the confirm recordings is more than their noise
@@ -53,7 +54,12 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     elif before < visible and best.rms < visible and before**2 - best.rms**2 < CLEAR_DROP / len(problem.cells):
         outcome, claimed = "not seen", best.effects
     elif best.rms > VISIBLE and better:
-        outcome, claimed = "rival", shared([best.effects, *(r.effects for r in better)])
+        by_id = {h.effect: h for h in diagnosis.twin.hypotheses}
+        fits = {c.effects: c.point for c in candidates}
+        held = [(*r.effects, *outside(diagnosis.explore, fits[r.effects], by_id)) for r in better]
+        outcome, claimed = "rival", shared([best.effects, *held])
+        if set(claimed) == set(best.effects):
+            outcome = "holds"
     elif best.rms > WORSE * before:
         outcome = "contradicted"
     else:

@@ -1,6 +1,6 @@
 """Which effect: evidence of the empty set, of every effect, of pairs and triples by beam; goodness of fit; groups."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -11,6 +11,7 @@ from .inference import Candidate, Problem
 from .twin import Hypothesis
 
 FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
+MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
 GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same trace
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
@@ -47,6 +48,8 @@ class Search:
     singles: list[Candidate]  # linearised, one per effect, for what the data could have shown
     families: list[Family]  # of the best structural candidate (of the null where there is none)
     null_families: list[Family]
+    #: the null with the first candidate's calibration effects at their specification, from where these count
+    within: Point
 
     @property
     def regions(self) -> list[Family]:
@@ -192,12 +195,19 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     _prune(problem, null, tried, by_id, accept)
     null, candidates = _concluded(problem, null, _ranked(tried.values(), addition), by_id, addition)
     unfitted = families(problem, null)
-    left = unfitted
+    left, within = unfitted, null
+    if candidates:
+        within = held(problem, null, candidates[0], by_id)
+    if unexplained(problem, within, candidates[0].point if candidates else null) > MOST:
+        outside = _outside(problem, null, by_id)
+        if outside is not None:
+            within = held(problem, null, outside, by_id)
+            candidates = [outside, *(c for c in candidates if set(c.effects) != set(outside.effects))]
     if candidates:
         chosen = [by_id[e] for e in candidates[0].effects]
         _, widened = problem.freed(chosen)
         left = families(problem, candidates[0].point, widened)
-    return Search(null, candidates, singles, left, unfitted)
+    return Search(null, candidates, singles, left, unfitted, within)
 
 
 def _concluded(
@@ -217,6 +227,51 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
         candidates = [c for c in candidates if _of_size(problem, c, by_id)]
     return null, candidates
+
+
+def unexplained(problem: Problem, before: Point, after: Point) -> float:
+    """Share of a fit's excess that another leaves."""
+    return float(np.clip(max(problem.excess(after), 0.0) / max(problem.excess(before), 1.0), 0.0, 1.0))
+
+
+def held(problem: Problem, null: Point, candidate: Candidate, by_id: Mapping[str, Hypothesis]) -> Point:
+    """The null with a candidate's calibration effects at their specification."""
+    _, own = problem.freed([by_id[e] for e in candidate.effects])
+    if not own:
+        return null
+    columns = [c for c, m in enumerate(null.free) if m not in own]
+    values = null.values.copy()
+    values[own] = problem.mean[own]
+    start = problem.predict(values)[0]
+    fit = problem.descend(problem.point(values, start, null.jacobian[:, columns], [null.free[c] for c in columns]))
+    return problem.point(fit.values, fit.prediction, null.jacobian, null.free)
+
+
+def outside(problem: Problem, point: Point, by_id: Mapping[str, Hypothesis]) -> list[str]:
+    """The calibration effects that a fit has far outside their tolerance, named or not."""
+    return [e for e, h in by_id.items() if h.kind == "calibration" and far_outside(problem, h, point)]
+
+
+def _outside(problem: Problem, null: Point, by_id: dict[str, Hypothesis]) -> Candidate | None:
+    """The calibration effects that the null has far outside their tolerance, of which each is most of the gap that
+    there is with it at its specification.
+
+    The null takes such an effect up but for the pull of the specification. Where it has another form than the model's
+    it leaves a remainder, which other sets then compete for though the cause is found.
+    """
+
+    def set_of(*effects: str) -> Candidate:
+        _, own = problem.freed([by_id[e] for e in effects])
+        columns = null.jacobian[:, [null.free.index(m) for m in own]]
+        return Candidate(effects, null, 0.0, True, null.values, columns)
+
+    far = [set_of(e) for e in outside(problem, null, by_id)]
+    most = [c.effects[0] for c in far if unexplained(problem, held(problem, null, c, by_id), null) < MOST]
+    if not most:
+        return None
+    _, widened = problem.freed([by_id[e] for e in most])
+    point = problem.resumed(null, null.values, widened)
+    return problem.polish(null, replace(set_of(*most), point=point), by_id)
 
 
 def _of_size(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:

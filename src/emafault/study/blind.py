@@ -5,7 +5,7 @@ the rung that leaves an effect out, which one the library lacks.
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ from ..gap.bench import read_bench
 from ..gap.decide import UNCALIBRATED, Calibration, Evidence
 from ..gap.run import diagnose_recordings
 from ..recording import replace_atomically
-from ..withheld.benches import make_cases
-from ..withheld.cases import draw_case
+from ..withheld.benches import make_cases, write_key_without
+from ..withheld.cases import draw_case, without_effect
 from .curves import DETECTABLE, fit_gap, fit_right
 
 FIELDS = [f.name for f in fields(Evidence)]
@@ -35,9 +35,11 @@ def run_cases(
     noise: SensorNoise,
     calibration: Calibration,
     keep_benches: bool = False,
+    again: Collection[int] = (),
 ) -> list[str]:
     """Make, diagnose and keep the verdicts of a rung's seeds; what is there already is left alone.
 
+    Of the seeds of T1 ``again`` are also diagnosed with the effect left out of the library: T3, on the same bench.
     ``FOLDER/keys`` and ``FOLDER/diagnoses/NAME/diagnosis.json`` stay; the recordings go once they are diagnosed.
 
     Returns
@@ -47,18 +49,23 @@ def run_cases(
     names = []
     for seed in seeds:
         case = draw_case(rung, seed)
-        names.append(case.name)
-        out = folder / "diagnoses" / case.name / "diagnosis.json"
-        if out.exists() and (folder / "keys" / f"{case.name}.json").exists():
+        cases = [case, without_effect(case)] if seed in again else [case]
+        names += [c.name for c in cases]
+        verdicts = [folder / "diagnoses" / c.name / "diagnosis.json" for c in cases]
+        keys = [folder / "keys" / f"{c.name}.json" for c in cases]
+        missing = [n for n in range(len(cases)) if not (verdicts[n].exists() and keys[n].exists())]
+        if not missing:
             continue
-        make_cases(rung, [seed], folder, actuator, noise)
         bench = folder / "benches" / case.name
         if not bench.exists():
-            (folder / "keys" / f"{case.name}.json").unlink()
-            make_cases(rung, [seed], folder, actuator, noise)
-        verdict = diagnose_bench(bench, actuator, noise, calibration, case.left_out)
-        text = json.dumps(verdict, indent=1)
-        replace_atomically(out, lambda temporary, text=text: temporary.write_text(text))
+            keys[0].unlink(missing_ok=True)
+        make_cases(rung, [seed], folder, actuator, noise)
+        for n in missing:
+            if n > 0:
+                write_key_without(keys[0], keys[n])
+            verdict = diagnose_bench(bench, actuator, noise, calibration, cases[n].left_out)
+            text = json.dumps(verdict | {"bench": cases[n].name}, indent=1)
+            replace_atomically(verdicts[n], lambda temporary, text=text: temporary.write_text(text))
         if not keep_benches:
             for file in bench.glob("*.nc"):
                 file.unlink()
@@ -75,7 +82,7 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
     folder = output.parent / f"cases_{code[:8]}"
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
     span = range(seeds["first"], seeds["last"])
-    names = run_cases(seeds["rung"], span, folder, actuator, noise, Calibration.load())
+    names = run_cases(seeds["rung"], span, folder, actuator, noise, Calibration.load(), again=seeds["again"])
     text = json.dumps({"folder": folder.name, "cases": names})
     replace_atomically(output, lambda temporary: temporary.write_text(text))
 

@@ -16,7 +16,7 @@ from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import time_axis
 from ..effects import EFFECTS
 from ..recording import Recording, replace_atomically, write_recording
-from .cases import RUNGS, Case, case_from_dict, draw_case
+from .cases import Case, case_from_dict, draw_case, without_effect
 from .detectability import Detector
 from .statistics import runs_of, simulate_plans
 
@@ -91,7 +91,7 @@ def write_bench(
         step = float(runs["speed_quantisation_step"][0])
         if truncate:
             runs["speed_quantisation_step"] = 0.0
-        measured = measure(signals, runs, scaled, len(RUNGS) * case.seed + RUNGS.index(case.rung), n)
+        measured = measure(signals, runs, scaled, case.noise_seed, n)
         speed = measured["rotor_speed"][0]
         recording = Recording(
             time=time_axis(plan.duration, plan.interval),
@@ -126,6 +126,13 @@ def write_key(
             nearest = min(distances, key=lambda r: distances[r])
             key["nearest_rival"] = {"effect": nearest, "distance": distances[nearest]}
     replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(key, indent=1)))
+
+
+def write_key_without(key: Path, path: Path) -> None:
+    """Write the key of the case of T3 on the bench of one of T1, whose key it is but for what the library lacks."""
+    written = json.loads(key.read_text())
+    written["case"] = without_effect(case_from_dict(written["case"])).to_dict()
+    replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(written, indent=1)))
 
 
 def near_rivals(effect: str) -> list[str]:

@@ -1,12 +1,13 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
-A case is a pure function of its rung and seed. Successive seeds go through the effects in order; rounds go through
+A case is a pure function of its rung and seed; one of T3 is that of T1 with its effect left out of the library, on the
+same recordings. Successive seeds go through the effects in order; rounds go through
 strata of the amplitude, each effect beginning elsewhere, so that a single round already holds weak and strong cases and
 any ``strata`` rounds are balanced.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 
 RUNGS = ("T0", "T1", "T2", "T3", "T4")
-STRATA = {"T1": 20, "T3": 5, "T4": 5}  # amplitude strata per effect
+STRATA = {"T1": 20, "T4": 5}  # amplitude strata per effect
 #: smallest amplitude of an effect, as a fraction of its realistic maximum: a third of what a typical bench shows at a
 #: squared distance of 25 (measured on other seeds), so that every effect's cases begin below the noise
 SMALLEST = {
@@ -87,8 +88,13 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Name of the bench; it says nothing about the truth."""
+        """Name of the case; it says nothing about the truth."""
         return f"{self.rung.lower()}_{self.seed:06d}"
+
+    @property
+    def noise_seed(self) -> int:
+        """Seed of the sensors' noise; one of each bench."""
+        return len(RUNGS) * self.seed + RUNGS.index("T1" if self.rung == "T3" else self.rung)
 
     def unit(self) -> dict[str, dict[str, float]]:
         """Tolerances and effects together, as the simulation takes them."""
@@ -119,6 +125,8 @@ def draw_case(rung: str, seed: int) -> Case:
     """
     if rung not in RUNGS:
         raise InputError(f"rung: got '{rung}', accepted are {', '.join(RUNGS)}")
+    if rung == "T3":
+        return without_effect(draw_case("T1", seed))
     rng = np.random.default_rng([RUNGS.index(rung), seed])
     ids = list(EFFECTS)
     effects: dict[str, dict[str, float]] = {}
@@ -137,7 +145,6 @@ def draw_case(rung: str, seed: int) -> Case:
         smallest = SMALLEST.get(effect, USUAL_SMALLEST)
         amplitude = smallest ** (1.0 - (stratum + rng.random()) / STRATA[rung])
         effects[effect] = draw_effect(effect, amplitude, rng)
-    single = tuple(effects)
     return Case(
         rung=rung,
         seed=seed,
@@ -149,9 +156,13 @@ def draw_case(rung: str, seed: int) -> Case:
         bus_voltage=bool(rng.random() > 0.15),
         amplitude=amplitude,
         strong_faults=strong,
-        left_out=single if rung == "T3" else (),
-        forms=single if rung == "T4" else (),
+        forms=tuple(effects) if rung == "T4" else (),
     )
+
+
+def without_effect(case: Case) -> Case:
+    """The case of T3 on the bench of one of T1."""
+    return replace(case, rung="T3", left_out=tuple(case.effects))
 
 
 def stratum_of(seed: int, rung: str) -> int:
