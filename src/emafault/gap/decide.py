@@ -98,18 +98,15 @@ def evidence_of(problem: Problem, found: Search, hypotheses: Sequence[Hypothesis
     null_excess = found.null_families[0].excess if found.null_families else 0.0
     if not found.candidates:
         return Evidence(0.0, null_excess, null_excess, 1.0, 1.0, 0.0, dof), []
-    group = groups(problem, found.null, found.candidates)[0]
     best = found.candidates[0]
-    inside = {c.effects for c in group}
     names = set(best.effects)
+    # what holds the best set and more, named or not, is no alternative to it
+    others = [c for c in found.candidates[1:] if not {*c.effects, *outside(problem, c.point, by_id)} > names]
+    group = groups(problem, found.null, [best, *others])[0]
+    inside = {c.effects for c in group}
     # all gains are over the null, in which a calibration effect is but for the pull of its specification
     pulled = found.null.log_evidence - found.within.log_evidence
-    rivals = [
-        c.gain + pulled
-        for c in found.candidates
-        if c.effects not in inside
-        and not ({*c.effects, *outside(problem, c.point, by_id)} > names or set(c.effects) < names)
-    ]
+    rivals = [c.gain + pulled for c in others if c.effects not in inside and not set(c.effects) < names]
     gain = best.gain + pulled
     margin = gain - max([*rivals, 0.0])
     share = unexplained(problem, found.within, best.point)
