@@ -136,6 +136,16 @@ def test_what_a_fit_can_only_take_up_far_from_the_specification_is_a_gap():
     assert decision.verdict == "unknown"
 
 
+@pytest.mark.parametrize(("most", "verdict"), [(3.0, "explained"), (1.0, "unknown")])
+def test_an_effect_that_ends_at_the_edge_of_its_range_stands_in_for_something_else(most, verdict):
+    twin = Lines(8, curvature=1.5)
+    twin.parameters[2] = Parameter("curve.a", "1", 0.0, 0.0, 1.0, -most, most, 0.01, "curve", amplitude=True)
+    problem = Problem(twin, ["one", "two"])
+    found = search(problem, twin.hypotheses, 3.0)
+    assert decide(problem, found, twin.hypotheses, Calibration.load()).verdict == verdict
+    assert any("curve" in c.effects for c in found.candidates) == (verdict == "explained")
+
+
 class Precise(Lines):
     """Recordings that tell the slope far better than its specification does."""
 

@@ -24,6 +24,7 @@ NEARLY = 0.01  # of the first one's gain, within which a rival may only lack con
 COMPARED = 4  # candidates that are compared without it
 SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
 OFF = 1e-6  # of the range of an amplitude, within which it is zero
+EDGE = 0.01  # of the range of an amplitude, within which it is at the range's end
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 LUCK = 6.0  # of the gain of a fit on single predictions, by which it may be off where they scatter
 
@@ -126,6 +127,17 @@ def negligible(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
     return bool(sizes) and all(size < least for size, least in sizes)
 
 
+def at_edge(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
+    """Whether an amplitude of an effect ends where its range does, well beyond the largest that is realistic: its
+    optimum lies elsewhere, so that the effect stands in for something else."""
+    for m in problem.effect_parameters(hypothesis):
+        p = problem.parameters[m]
+        near = EDGE * (p.high - p.low)
+        if p.amplitude and any(abs(point.values[m] - end) < near < abs(end - p.off) for end in (p.low, p.high)):
+            return True
+    return False
+
+
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
     """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence one more effect must bring."""
     null = problem.fit_null()
@@ -221,11 +233,11 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > least:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
-        candidates = [c for c in candidates if _of_size(problem, c, by_id)]
+        candidates = [c for c in candidates if _sound(problem, c, by_id)]
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
-        candidates = [c for c in candidates if _of_size(problem, c, by_id)]
+        candidates = [c for c in candidates if _sound(problem, c, by_id)]
     return null, candidates
 
 
@@ -279,6 +291,13 @@ def _of_size(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis
     return not any(negligible(problem, by_id[e], candidate.point) for e in candidate.effects)
 
 
+def _sound(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
+    """Whether each member of a candidate is as large as it ever is, and no larger."""
+    return _of_size(problem, candidate, by_id) and not any(
+        at_edge(problem, by_id[e], candidate.point) for e in candidate.effects
+    )
+
+
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
     """Best first; an effect more must be worth it: ``addition`` is the prior odds against each further member."""
     return sorted(candidates, key=lambda c: addition * (len(c.effects) - 1) - c.gain)
@@ -325,7 +344,7 @@ def _fitted_alike(
 
     def fitted(candidate: Candidate) -> Candidate | None:
         done = problem.polish(null, candidate, by_id)
-        return done if _of_size(problem, done, by_id) else None
+        return done if _sound(problem, done, by_id) else None
 
     first = None
     while ranked and first is None:
