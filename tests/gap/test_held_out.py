@@ -6,7 +6,7 @@ import pytest
 
 from emafault.gap.decide import share_left
 from emafault.gap.held_out import claim
-from emafault.gap.which import MOST
+from emafault.gap.misfit import MOST
 
 
 def verdict():

@@ -6,20 +6,14 @@ import numpy as np
 import pytest
 
 from emafault.gap.decide import UNCALIBRATED, Calibration, decide, evidence_of, share_left
+from emafault.gap.groups import groups
 from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
 from emafault.gap.inference import Problem
+from emafault.gap.misfit import MOST, SPECIFICATION, families, left_where_acting
+from emafault.gap.sizes import outside
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
-from emafault.gap.which import (
-    MOST,
-    SPECIFICATION,
-    _fitted_alike,
-    families,
-    groups,
-    left_where_acting,
-    outside,
-    search,
-)
+from emafault.gap.which import _fitted_alike, search
 
 
 class Lines:

@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .groups import groups
 from .how_far import square_error
 from .inference import Candidate, Problem
+from .misfit import MOST, left_where_acting, unexplained
+from .sizes import far_outside, outside
 from .twin import Hypothesis
-from .which import MOST, Search, far_outside, groups, left_where_acting, outside, unexplained
+from .which import Search
 
 DEFAULT = Path(__file__).with_name("calibration.json")
 #: the prior of a calibration

@@ -10,11 +10,12 @@ import numpy as np
 
 from .decide import Calibration, Decision, decide, is_named, share_left
 from .gaussian import Point
+from .groups import confusability
 from .how_far import Ladder, Rung, climb, closed
 from .inference import Candidate, Problem
 from .twin import INTERVAL, Twin
 from .where import beyond_specification, equation_of, where
-from .which import Search, confusability, search
+from .which import Search, search
 
 CONFUSED = 0.9  # cosine of two signatures from which the report calls them hard to tell apart
 

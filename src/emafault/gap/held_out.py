@@ -7,7 +7,7 @@ import numpy as np
 
 from .diagnose import Diagnosis
 from .how_far import own_nuisances, refit
-from .which import outside
+from .sizes import outside
 
 RIVALS = 12
 VISIBLE = 1.3  # root mean square from which a misfit on the confirm recordings is more than their noise

@@ -12,8 +12,8 @@ from ..figures import gap as figures
 from ..figures.page import Page
 from .diagnose import Diagnosis
 from .inference import Problem
+from .misfit import Family
 from .retrained import MARKS
-from .which import Family
 from .words import cannot_tell, consequence, effect_words, finding, interval, moved_words, number
 
 NAMED = ("explained", "group", "partly")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .inference import Problem
-from .which import SPECIFICATION, Family
+from .misfit import SPECIFICATION, Family
 
 VISIBLE = 3.0  # excess of a family, in standard deviations of its chi-square, from which it is listed
 LISTED = 12

@@ -1,18 +1,16 @@
-"""Which effect: evidence of the empty set, of every effect, of pairs and triples by beam; goodness of fit; groups."""
+"""Which effect: evidence of the empty set, of every effect, of pairs and triples by beam."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
 from .gaussian import Point
 from .inference import Candidate, Problem
+from .misfit import MOST, SPECIFICATION, Family, families, unexplained
+from .sizes import far_outside, held, of_size, outside, sound
 from .twin import Hypothesis
 
-FAR_OUTSIDE = 4.0  # tolerances (1 sigma) beyond which a calibration effect is named
-MOST = 0.5  # share that a named set may leave of the gap, where it acts, and of the gap on the confirm recordings
-GROUP_DISTANCE = 6.0  # squared distance below which two causes leave the same trace
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
@@ -22,22 +20,8 @@ DESERVED = 0.3  # share of what a set leaves that one more effect must take up
 WITHIN_LUCK = 60.0  # gain that separates candidates beyond what the scatter of their predictions may do
 NEARLY = 0.01  # of the first one's gain, within which a rival may only lack convergence
 COMPARED = 4  # candidates that are compared without it
-SPECIFICATION = "specification"  # where the misfit of a parameter with its specification lies
-OFF = 1e-6  # of the range of an amplitude, within which it is zero
-EDGE = 0.01  # of the range of an amplitude, within which it is at the range's end
 HOPELESS = 2.0  # gain below which a linearised candidate is not refitted
 LUCK = 6.0  # of the gain of a fit on single predictions, by which it may be off where they scatter
-
-
-@dataclass(frozen=True)
-class Family:
-    """All statistics of one kind over the recordings: how far they are from a prediction, in standard deviations."""
-
-    equation: str
-    label: str
-    along: str
-    excess: float
-    size: int
 
 
 @dataclass(frozen=True)
@@ -58,86 +42,6 @@ class Search:
         return [f for f in self.null_families if f.along != SPECIFICATION]
 
 
-def families(problem: Problem, point: Point, widened: Sequence[int] = ()) -> list[Family]:
-    """Misfit by kind of statistic, whitened one statistic at a time; largest first.
-
-    ``excess`` is (chi2 - n)/sqrt(2 n) of the family's n statistics. How far a fit has moved what is specified or
-    measured of the unit (but for the ``widened`` parameters) is a misfit like any other.
-    """
-    groups = _by_family(problem, problem.observed - point.prediction, point.values - problem.mean, widened)
-    out = [
-        Family(e, label, along, float((np.square(v).sum() - len(v)) / np.sqrt(2.0 * len(v))), len(v))
-        for (e, label, along), v in groups.items()
-    ]
-    return sorted(out, key=lambda f: -f.excess)
-
-
-def _by_family(
-    problem: Problem, difference: np.ndarray, shift: np.ndarray, widened: Sequence[int]
-) -> dict[tuple[str, str, str], np.ndarray]:
-    """Differences of the judging recordings' statistics, and of what is specified, in standard deviations by kind."""
-    groups: dict[tuple[str, str, str], list[float]] = {}
-    judging = problem.judging
-    for cell, value in zip(problem.cells, difference / problem.deviations(), strict=True):
-        if cell.recording in judging:
-            groups.setdefault((cell.equation, cell.label, cell.along), []).append(float(value))
-    for m in problem.nuisances:
-        p = problem.parameters[m]
-        if p.specified and m not in widened:
-            label = p.name if p.recordings is None else p.name.rsplit(".", 1)[-1]
-            groups.setdefault((p.specified, label, SPECIFICATION), []).append(float(shift[m] / p.sd))
-    return {kind: np.array(values) for kind, values in groups.items()}
-
-
-def left_where_acting(problem: Problem, null: Point, fit: Point, widened: Sequence[int] = ()) -> float:
-    """Share of the misfit that a fitted set leaves in the kinds of statistics it acts on, by how much it moves each.
-
-    A cause written in another form leaves a remainder, often elsewhere; a stand-in for a cause that the library lacks
-    leaves some of the gap in the very statistics that it takes up. ``widened`` are the set's calibration parameters,
-    which the null has too: they count from their specification.
-    """
-    before = null.prediction
-    for m in widened:
-        before = before - null.jacobian[:, null.free.index(m)] * (null.values[m] - problem.mean[m])
-    moved = _by_family(problem, fit.prediction - before, fit.values - null.values, widened)
-    left = _by_family(problem, problem.observed - fit.prediction, fit.values - problem.mean, widened)
-    total = shared = 0.0
-    for kind, values in moved.items():
-        size, power = len(values), float(np.square(values).sum())
-        excess = max(float(np.square(left[kind]).sum()) - size - 2.0 * np.sqrt(2.0 * size), 0.0)
-        total += power
-        shared += power * excess / max(power + excess, 1e-12)
-    return float(shared / total) if total > 0.0 else 1.0
-
-
-def far_outside(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether a calibration effect's parameter lies beyond ``FAR_OUTSIDE`` tolerances."""
-    own = problem.effect_parameters(hypothesis)
-    return any(abs(point.values[m] - problem.mean[m]) > FAR_OUTSIDE * problem.sd[m] for m in own)
-
-
-def negligible(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether an effect is off, or smaller than it ever is where its realistic range does not begin at zero."""
-    own = [problem.parameters[m] for m in problem.effect_parameters(hypothesis)]
-    sizes = [
-        (abs(point.values[problem.names[p.name]] - p.off), max(p.least, OFF * (p.high - p.low)))
-        for p in own
-        if p.amplitude or p.least > 0.0
-    ]
-    return bool(sizes) and all(size < least for size, least in sizes)
-
-
-def at_edge(problem: Problem, hypothesis: Hypothesis, point: Point) -> bool:
-    """Whether an amplitude of an effect ends where its range does, well beyond the largest that is realistic: its
-    optimum lies elsewhere, so that the effect stands in for something else."""
-    for m in problem.effect_parameters(hypothesis):
-        p = problem.parameters[m]
-        near = EDGE * (p.high - p.low)
-        if p.amplitude and any(abs(point.values[m] - end) < near < abs(end - p.off) for end in (p.low, p.high)):
-            return True
-    return False
-
-
 def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) -> Search:
     """Fit the empty set and candidate sets; ``addition`` is the gain in log evidence one more effect must bring."""
     null = problem.fit_null()
@@ -156,7 +60,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
             key = tuple(sorted(candidate.effects))
             if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
                 continue
-            if not _of_size(problem, candidate, by_id):
+            if not of_size(problem, candidate, by_id):
                 continue
             if key not in tried or candidate.gain > tried[key].gain:
                 tried[key] = candidate
@@ -211,10 +115,10 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     if candidates:
         within = held(problem, null, candidates[0], by_id)
     if unexplained(problem, within, candidates[0].point if candidates else null) > MOST:
-        outside = _outside(problem, null, by_id)
-        if outside is not None:
-            within = held(problem, null, outside, by_id)
-            candidates = [outside, *(c for c in candidates if set(c.effects) != set(outside.effects))]
+        unit = _outside(problem, null, by_id)
+        if unit is not None:
+            within = held(problem, null, unit, by_id)
+            candidates = [unit, *(c for c in candidates if set(c.effects) != set(unit.effects))]
     if candidates:
         chosen = [by_id[e] for e in candidates[0].effects]
         _, widened = problem.freed(chosen)
@@ -233,35 +137,12 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > least:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
-        candidates = [c for c in candidates if _sound(problem, c, by_id)]
+        candidates = [c for c in candidates if sound(problem, c, by_id)]
     if candidates:
         candidates = _deserved(problem, null, candidates, by_id)
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
-        candidates = [c for c in candidates if _sound(problem, c, by_id)]
+        candidates = [c for c in candidates if sound(problem, c, by_id)]
     return null, candidates
-
-
-def unexplained(problem: Problem, before: Point, after: Point) -> float:
-    """Share of a fit's excess that another leaves."""
-    return float(np.clip(max(problem.excess(after), 0.0) / max(problem.excess(before), 1.0), 0.0, 1.0))
-
-
-def held(problem: Problem, null: Point, candidate: Candidate, by_id: Mapping[str, Hypothesis]) -> Point:
-    """The null with a candidate's calibration effects at their specification."""
-    _, own = problem.freed([by_id[e] for e in candidate.effects])
-    if not own:
-        return null
-    columns = [c for c, m in enumerate(null.free) if m not in own]
-    values = null.values.copy()
-    values[own] = problem.mean[own]
-    start = problem.predict(values)[0]
-    fit = problem.descend(problem.point(values, start, null.jacobian[:, columns], [null.free[c] for c in columns]))
-    return problem.point(fit.values, fit.prediction, null.jacobian, null.free)
-
-
-def outside(problem: Problem, point: Point, by_id: Mapping[str, Hypothesis]) -> list[str]:
-    """The calibration effects that a fit has far outside their tolerance, named or not."""
-    return [e for e, h in by_id.items() if h.kind == "calibration" and far_outside(problem, h, point)]
 
 
 def _outside(problem: Problem, null: Point, by_id: dict[str, Hypothesis]) -> Candidate | None:
@@ -284,18 +165,6 @@ def _outside(problem: Problem, null: Point, by_id: dict[str, Hypothesis]) -> Can
     _, widened = problem.freed([by_id[e] for e in most])
     point = problem.resumed(null, null.values, widened)
     return problem.polish(null, replace(set_of(*most), point=point), by_id)
-
-
-def _of_size(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
-    """Whether no member of a candidate is negligible."""
-    return not any(negligible(problem, by_id[e], candidate.point) for e in candidate.effects)
-
-
-def _sound(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
-    """Whether each member of a candidate is as large as it ever is, and no larger."""
-    return _of_size(problem, candidate, by_id) and not any(
-        at_edge(problem, by_id[e], candidate.point) for e in candidate.effects
-    )
 
 
 def _ranked(candidates: Iterable[Candidate], addition: float) -> list[Candidate]:
@@ -344,7 +213,7 @@ def _fitted_alike(
 
     def fitted(candidate: Candidate) -> Candidate | None:
         done = problem.polish(null, candidate, by_id)
-        return done if _sound(problem, done, by_id) else None
+        return done if sound(problem, done, by_id) else None
 
     first = None
     while ranked and first is None:
@@ -477,50 +346,3 @@ def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothes
         if top is best:
             return
         best = top
-
-
-def groups(problem: Problem, null: Point, candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """The first candidate together with those that these data cannot tell from it.
-
-    Predictions that differ by no more than they scatter do not differ, nor are their sets told apart by how well each
-    happens to fall: a member's gain is that of the first one's prediction moved by what truly differs.
-    """
-    if not candidates:
-        return []
-    first = candidates[0]
-    members = [first]
-    for other in candidates[1:]:
-        if any(set(other.effects) >= set(m.effects) or set(other.effects) <= set(m.effects) for m in members):
-            continue
-        apart = problem.seen(other.point.prediction - first.point.prediction)
-        distance = problem.squared_distance(null, problem.whiten(apart))
-        moved = problem.whiten(problem.observed - first.point.prediction - apart)
-        gain = other.gain + 0.5 * (other.point.misfit - float(moved @ moved))
-        # two predictions so far apart differ in log evidence by about as much from the noise of the data alone
-        if distance < GROUP_DISTANCE and first.gain - gain < GROUP_DISTANCE / 2 + 2.0 * np.sqrt(distance):
-            members.append(replace(other, gain=gain))
-            continue
-        # scatter puts predictions further apart than they are: the data do not prefer one of these either
-        gain = max(gain, other.gain)
-        if distance < 2.0 * GROUP_DISTANCE and first.gain - gain < GROUP_DISTANCE / 2:
-            members.append(replace(other, gain=gain))
-    return [members]
-
-
-def confusability(problem: Problem, null: Point, singles: Sequence[Candidate]) -> dict[tuple[str, str], float]:
-    """Cosine of the signatures of every two effects with the nuisances projected out, largest over their parameters."""
-    bases = {}
-    for c in singles:
-        if c.signature.size and np.any(c.signature):
-            signature = problem.whiten(c.signature)
-            columns = problem.projected(null, signature)
-            inner = signature.T @ columns
-            values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
-            keep = values > 1e-9 * max(values.max(), 1e-30)
-            bases[c.effects[0]] = (signature @ vectors[:, keep], columns @ vectors[:, keep] / values[keep])
-    out = {}
-    for (a, (raw_a, dual_a)), (b, (raw_b, dual_b)) in combinations(bases.items(), 2):
-        # squared canonical correlations of the two signature spaces under the marginal metric
-        cross = (dual_a.T @ raw_b) @ (dual_b.T @ raw_a)
-        out[a, b] = float(np.sqrt(np.clip(np.max(np.real(np.linalg.eigvals(cross))), 0.0, 1.0)))
-    return out

@@ -9,10 +9,10 @@ import numpy as np
 
 from emafault.gap.decide import Calibration
 from emafault.gap.diagnose import INTERVAL, Diagnosis, diagnose
+from emafault.gap.groups import GROUP_DISTANCE, confusability
 from emafault.gap.held_out import claim, held_out
 from emafault.gap.next_experiment import next_experiments
 from emafault.gap.where import equation_of
-from emafault.gap.which import GROUP_DISTANCE, confusability
 from emafault.twins.library import bench, build_twin, distortions, read_cases
 from emafault.twins.measured import Arrays, MeasuredTwin
 from emafault.twins.reconstructed import reconstruct_measured
