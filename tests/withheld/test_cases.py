@@ -13,7 +13,7 @@ from emafault.actuator.commands import command_positions
 from emafault.actuator.fixed_step import simulate_fixed_step
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise
-from emafault.config import reference_actuator
+from emafault.config import reference_actuator, withheld_jobs, withheld_spec
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.recording import read_recording
@@ -62,6 +62,19 @@ def test_what_is_left_out_on_t3_is_in_the_bench_of_t1():
     assert left_out.recordings == shown.recordings and left_out.unit() == shown.unit()
     assert left_out.noise_seed == shown.noise_seed
     assert len({draw_case(rung, 137).noise_seed for rung in RUNGS}) == len(RUNGS) - 1
+
+
+@pytest.mark.parametrize("draw", ["standard", "development", "smallest"])
+def test_t3_takes_whole_rounds_of_t1_spread_over_the_draw(draw):
+    specs = [withheld_spec(draw, rung, n)["seeds"] for rung, n in withheld_jobs(draw)]
+    shown = [seed for s in specs if s["rung"] == "T1" for seed in range(s["first"], s["last"])]
+    again = [seed for s in specs for seed in s["again"]]
+    assert len(again) == len(set(again)) and set(again) <= set(shown)
+    assert not any(s["rung"] == "T3" or (s["again"] and s["rung"] != "T1") for s in specs)
+    if draw == "standard":
+        assert (len(shown), len(again)) == (620, 155)
+        strata = [stratum_of(seed, "T1") for seed in again if seed % len(IDS) == 0]
+        assert np.ptp(np.diff(sorted(strata))) == 0  # the same steps from weak to strong
 
 
 def test_seeds_go_through_effects_and_amplitudes():

@@ -33,6 +33,8 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     ``outcome``: ``holds``; ``contradicted``, the named set leaves these recordings no better than the recalibrated
     nominal model does; ``rival``, a set that fitted the explore recordings less well leaves them much better;
     ``not seen``, they show no gap; ``no claim``, nothing was named.
+    ``before``: the rung that this counts from: ``recalibrated``, or ``nominal`` for a set of calibration effects, which
+    the former has.
     ``claimed``: the effects that are left to claim: the named set, or what it shares with the rivals that hold better.
     ``rivals``: effects, gain in log evidence on the explore recordings and root mean square on these, best first.
     """
@@ -44,7 +46,9 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     free = own_nuisances(problem)
     rivals = [Rival(c.effects, c.gain, refit(problem, c.point.values, free).rms) for c in candidates]
     best = rivals[0]
-    before = ladder.recalibrated.rms
+    by_id = {h.effect: h for h in diagnosis.twin.hypotheses}
+    structural = any(by_id[e].kind != "calibration" for e in best.effects)
+    before = (ladder.recalibrated if structural else ladder.nominal).rms
     named = decision.verdict in ("explained", "group", "partly")
     better = [r for r in rivals[1:] if r.rms < BETTER * best.rms and r.rms < WORSE * before]
     visible = max(VISIBLE, 1.0 + 2.0 / np.sqrt(2.0 * len(problem.cells)))
@@ -54,7 +58,6 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
     elif before < visible and best.rms < visible and before**2 - best.rms**2 < CLEAR_DROP / len(problem.cells):
         outcome, claimed = "not seen", best.effects
     elif best.rms > VISIBLE and better:
-        by_id = {h.effect: h for h in diagnosis.twin.hypotheses}
         fits = {c.effects: c.point for c in candidates}
         held = [(*r.effects, *outside(diagnosis.explore, fits[r.effects], by_id)) for r in better]
         outcome, claimed = "rival", shared([best.effects, *held])
@@ -68,7 +71,8 @@ def held_out(diagnosis: Diagnosis, most: int = RIVALS) -> dict:
         {"effects": list(r.effects), "log_evidence_gain": round(r.gain, 2), "rms": round(r.rms, 4)}
         for r in sorted(rivals, key=lambda r: r.rms)
     ]
-    return {"outcome": outcome, "claimed": list(claimed), "rivals": listed}
+    rung = "recalibrated" if structural else "nominal"
+    return {"outcome": outcome, "before": rung, "claimed": list(claimed), "rivals": listed}
 
 
 def contested(diagnosis: Diagnosis) -> bool:

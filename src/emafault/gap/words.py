@@ -100,8 +100,8 @@ def _held_out(verdict: Mapping[str, Any]) -> tuple[bool, str]:
     signal = verdict["shrinks"]["signal"]
     if signal is None:
         return True, " No recording was held out, so nothing confirms it."
-    before, after, placebo = signal["recalibrated"], signal["after"], signal["placebo"]
     held_out = verdict.get("held_out", {})
+    before, after, placebo = signal[held_out.get("before", "recalibrated")], signal["after"], signal["placebo"]
     outcome = held_out.get("outcome", "holds")
     if outcome == "contradicted":
         return False, (
