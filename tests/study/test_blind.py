@@ -59,9 +59,13 @@ def test_evidence_counts_one_way_only(tmp_path):
     assert min(found.gap[1:]) >= 0.0
 
 
-def test_what_the_library_lacks_says_nothing_of_whether_there_is_a_gap(tmp_path):
-    fill(tmp_path / "one", wrong=0)
-    fill(tmp_path / "two", wrong=0)
+def test_what_the_library_lacks_is_a_gap_only_where_it_leaves_more_than_effect_free_cases_do(tmp_path):
+    for name in ("one", "two", "three"):
+        fill(tmp_path / name, wrong=0)
     for n in range(30):
         add(tmp_path / "two", f"t3_{n}", ["backlash"], (0.0, 3.0, 3.0, 1.0), left_out=["backlash"])
-    assert calibrate(tmp_path / "one", START).gap == calibrate(tmp_path / "two", START).gap
+        add(tmp_path / "three", f"t3_{n}", ["backlash"], (0.0, 15.0 + n, 3.0, 1.0), left_out=["backlash"])
+    one, two, three = (calibrate(tmp_path / name, START).gap for name in ("one", "two", "three"))
+    assert one == two
+    assert probability(three, [0.0, saturating(30.0)]) > max(0.9, probability(one, [0.0, saturating(30.0)]))
+    assert probability(three, [0.0, saturating(3.0)]) < 0.2

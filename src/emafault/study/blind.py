@@ -111,9 +111,10 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
     """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
 
     The first curve is fitted to whether a case held a detectable gap, the second to whether the best set was right
-    among cases that did and in which the first curve sees it.
+    among cases that did and in which the first curve sees it. What the library lacks counts as a gap where it leaves
+    more than any effect-free case does: what it leaves within that is no gap that these statistics could tell.
     """
-    gap_rows, gap_truth, seen, right_rows, right_truth = [], [], [], [], []
+    gap_rows, gap_truth, lacking, seen, right_rows, right_truth = [], [], [], [], [], []
     for path in sorted((folder / "keys").glob("*.json")):
         verdict_path = folder / "diagnoses" / path.stem / "diagnosis.json"
         if not verdict_path.exists():
@@ -122,9 +123,10 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         truth = set(key["case"]["effects"])
         distance = (key["detectability"] or {}).get("nominal", 0.0)
         evidence = Evidence(**{name: verdict["evidence"][name] for name in FIELDS})
-        # what the library lacks and leaves within the noise is no gap that these statistics could tell
-        if not truth or (distance >= DETECTABLE and not key["case"]["left_out"]):
-            gap_rows.append(evidence.gap_features())
+        if truth and distance >= DETECTABLE and key["case"]["left_out"]:
+            lacking.append(evidence)
+        elif not truth or distance >= DETECTABLE:
+            gap_rows.append(evidence)
             gap_truth.append(bool(truth))
         if not verdict["evidence"]["candidates"] or not truth or distance < DETECTABLE:
             continue
@@ -135,7 +137,10 @@ def calibrate(folder: Path, start: Calibration) -> Calibration:
         seen.append(evidence.gap_features())
         right_rows.append(evidence.right_features())
         right_truth.append(right)
-    gap = fit_gap(np.array(gap_rows), np.array(gap_truth), start)
+    noise = max((e.null_excess for e, truth in zip(gap_rows, gap_truth) if not truth), default=np.inf)
+    beyond = [e for e in lacking if e.null_excess > noise]
+    gap_rows, gap_truth = [*gap_rows, *beyond], [*gap_truth, *[True] * len(beyond)]
+    gap = fit_gap(np.array([e.gap_features() for e in gap_rows]), np.array(gap_truth), start)
     asked = np.array(seen) @ np.array(gap) > 0.0
     rows, truths = np.array(right_rows)[asked], np.array(right_truth)[asked]
     curve, most = fit_right(rows, truths, start)
