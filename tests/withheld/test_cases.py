@@ -195,6 +195,14 @@ def test_rivals_from_the_key_alone(tmp_path):
     assert rival_distances(key, []) == {}
 
 
+def test_beside_another_effect_a_load_and_friction_asymmetry_stay_one_and_the_same(tmp_path):
+    assert list(draw_case("T2", 620).effects) == ["load_constant", "cogging"]
+    (name,) = make_cases("T2", [620], tmp_path, reference_actuator(), NOISE)
+    key = json.loads((tmp_path / "keys" / f"{name}.json").read_text())
+    apart = rival_distances(key, ["friction_asymmetry", "contact_resistance"])
+    assert apart["friction_asymmetry"] < 6.0 < 25.0 < apart["contact_resistance"]
+
+
 def test_turns_shorted_in_all_phases_are_known_as_well_as_the_units_k_without_a_healthy_recording():
     """All three alike are a smaller R, k and L: only the tolerance of k (0.5 %) tells them from the unit."""
     case = draw_case("T1", seed_of("cogging", 10))

@@ -62,6 +62,17 @@ def test_a_group_is_right_only_if_all_of_it_is_near():
     assert not is_right(Answer("group", ("load_constant", "unknown"), 0.9), key_of(LOAD), {})
 
 
+def test_a_group_of_sets_is_no_exact_name_but_right_as_a_group_if_all_of_it_is_near(monkeypatch):
+    sets = [(["cogging", other], 0.48, {"group": 0}) for other in ("load_constant", "friction_asymmetry")]
+    verdict = verdict_of("group", sets, [["cogging", "friction_asymmetry", "load_constant"]])
+    for distance, near in ((5.9, True), (6.1, False)):
+        monkeypatch.setattr(verdicts, "rival_distances", lambda key, rivals, d=distance: dict.fromkeys(rivals, d))
+        row = judge(key_of({**COGGING, **LOAD}, "T2"), verdict)
+        assert not row["right"] and row["in_group"] is near
+    row = judge(key_of({**LOAD, "stribeck": {"a": 0.01, "w_s": 6.0}}, "T2"), verdict)
+    assert not row["in_group"]
+
+
 def test_unknown_and_no_gap():
     assert not is_right(Answer("unknown", ("unknown",), 1.0), key_of(COGGING), {})
     assert is_right(Answer("unknown", ("unknown",), 1.0), key_of(COGGING, "T3", left_out=("cogging",)), {})

@@ -265,6 +265,18 @@ class Detector:
             return self.squared(self.delta) + self.lattice
         return self.linear_distance(self.delta, self.columns(effect, COORDINATES[effect].start)) + self.lattice
 
+    def linear_swap(self, effect: str) -> float:
+        """First-order squared distance from a truth of several effects to the nearest with this one in place of one."""
+        effects = [e for e in self.case.effects if e != "speed_quantisation"]
+        found = []
+        for out in effects:
+            kept = {e: v for e, v in self.case.effects.items() if e != out}
+            design = [self.columns(e, COORDINATES[e].point(kept[e])) for e in effects if e != out]
+            design.append(self.columns(effect, COORDINATES[effect].start))
+            rest = self.delta - self.shift(None, kept)
+            found.append(max(0.0, self.linear_distance(rest, np.concatenate(design, 1)) - self.repeat))
+        return min(found)
+
     def detectability(self) -> Detectability:
         """Distances that go into the key."""
         effects = [e for e in self.case.effects if e != "speed_quantisation"]

@@ -171,7 +171,7 @@ METRICS = (
     Metric("wrong_t4_all", "a wrong name, T4, every amplitude", _single("T4"), _wrong, sense=-1),
     Metric("wrong_t0_weak", "a wrong name, T0 without strong faults", _weak, _wrong, sense=-1),
     Metric("wrong_t0_strong", "a wrong name, T0 with strong faults", _strong, _wrong, sense=-1),
-    Metric("first_t2", "two effects named, alone or first of a group, T2", _count(2), share("first_right")),
+    Metric("group_t2", "two effects named, or a group that no data tell apart, T2", _count(2), share("in_group")),
     Metric("triples_t2", "three effects named exactly, T2", _count(3), _right),
     Metric("faults_t2", "one effect beside strong faults, T2", _count(1), _right),
     Metric("t2_all", "sets named exactly, T2, every amplitude", _single("T2"), _right),

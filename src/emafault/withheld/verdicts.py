@@ -87,11 +87,6 @@ def first_answer(verdict: Mapping) -> Answer:
     return Answer("named", tuple(entry["effects"]), float(entry["probability"]))
 
 
-def _first_set(verdict: Mapping) -> tuple[str, ...]:
-    """The first set that the verdict lists, whether it stands alone or leads a group."""
-    return next((tuple(e["effects"]) for e in verdict["which"] if e["effects"] and UNKNOWN not in e["effects"]), ())
-
-
 def names_truth(named: tuple[str, ...], truth: tuple[str, ...]) -> bool:
     """Whether a named set's structural part is the truth's and the truth's calibration effects are all named."""
     structural = set(named) - CALIBRATION
@@ -99,7 +94,7 @@ def names_truth(named: tuple[str, ...], truth: tuple[str, ...]) -> bool:
 
 
 def is_right(answer: Answer, key: Mapping, rivals: Mapping[str, float]) -> bool:
-    """Whether an answer is right; a group is if it holds the truth and nothing that lies far from it."""
+    """Whether an answer is right; of one effect a group is if it holds the truth and nothing that lies far from it."""
     truth = tuple(key["case"]["effects"])
     if key["case"]["left_out"]:
         return answer.kind == "unknown"
@@ -107,9 +102,14 @@ def is_right(answer: Answer, key: Mapping, rivals: Mapping[str, float]) -> bool:
         return answer.kind == "no_gap"
     if answer.kind == "named":
         return names_truth(answer.effects, truth)
-    if answer.kind != "group" or len(truth) != 1 or truth[0] not in answer.effects:
+    return len(truth) == 1 and in_group(answer, truth, rivals)
+
+
+def in_group(answer: Answer, truth: tuple[str, ...], rivals: Mapping[str, float]) -> bool:
+    """Whether an answer is a group that holds the truth and nothing that lies far from it."""
+    if answer.kind != "group" or not set(truth) <= set(answer.effects):
         return False
-    return all(rivals.get(m, np.inf) <= IN_GROUP for m in answer.effects if m != truth[0])
+    return all(rivals.get(m, np.inf) <= IN_GROUP for m in answer.effects if m not in truth)
 
 
 def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict:
@@ -131,11 +131,10 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
     rivals: dict[str, float] = {}
     detectability = key["detectability"] or {"nominal": 0.0, "members": {}}
     detectable = bool(truth) and min(detectability["members"].values()) >= DETECTABLE
-    single = len(truth) == 1
-    if single and answer.kind in ("named", "group"):
-        others = [m for m in answer.effects if m in EFFECTS and m != truth[0]]
-        ask = answer.kind == "group" and truth[0] in answer.effects
-        ask |= detectable and len(answer.effects) == 1
+    if truth and answer.kind in ("named", "group"):
+        others = [m for m in answer.effects if m in EFFECTS and m not in truth]
+        ask = answer.kind == "group" and set(truth) <= set(answer.effects)
+        ask |= len(truth) == 1 and detectable and len(answer.effects) == 1
         rivals = rival_distances(dict(key), others) if ask else {}
         # a fault in the group is the nominal model, in which faults are free
         rivals |= {m: detectability["nominal"] for m in answer.effects if m in FAULT_NAMES}
@@ -156,7 +155,7 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
         "answer": answer.kind,
         "named": list(answer.effects),
         "right": right,
-        "first_right": answer.kind in ("named", "group") and names_truth(_first_set(verdict), truth),
+        "in_group": right or in_group(answer, truth, rivals),
         "wrong_name": answer.kind in ("named", "group") and not right,
         "rivals": rivals,
         "confidence": min(1.0, confidence),
