@@ -144,7 +144,7 @@ def near_rivals(effect: str) -> list[str]:
 def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
     """Squared distances from a case's truth to the nearest point of other effects, simulated from the key alone.
 
-    Where the truth holds several effects, each of the others takes the place of one of these, to first order.
+    Where the truth holds several effects, each of the others takes the place of one of these.
     """
     wanted = list(rivals)
     if not wanted:
@@ -152,5 +152,5 @@ def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
     case = case_from_dict(key["case"])
     actuator, noise = ActuatorParameters(**key["actuator"]), SensorNoise(**key["noise"])
     detector = Detector(case, actuator, noise, simulate_truth(case, actuator))
-    distance = detector.distance_to if len(case.effects) == 1 else detector.linear_swap
+    distance = detector.distance_to if len(case.effects) == 1 else detector.distance_in_place
     return {rival: distance(rival) for rival in wanted}

@@ -171,21 +171,28 @@ class Detector:
         return float(shift @ shift - inner @ cho_solve(self.normal, inner))
 
     def columns(
-        self, effect: str, at: np.ndarray, x: np.ndarray | None = None, there: np.ndarray | None = None
+        self,
+        effect: str,
+        at: np.ndarray,
+        x: np.ndarray | None = None,
+        there: np.ndarray | None = None,
+        beside: Unit | None = None,
     ) -> np.ndarray:
         """Derivatives of all statistics by an effect's coordinates about ``at``, (statistic, coordinate)."""
-        coordinates = COORDINATES[effect]
+        coordinates, others = COORDINATES[effect], beside or {}
         if there is None:
-            there = self.shift(x, {effect: coordinates.values(at)})
+            there = self.shift(x, {**others, effect: coordinates.values(at)})
         columns = []
         for c, step in enumerate(coordinates.steps(at)):
             moved = at.copy()
             moved[c] += step
-            columns.append((self.shift(x, {effect: coordinates.values(moved)}) - there) / step)
+            columns.append((self.shift(x, {**others, effect: coordinates.values(moved)}) - there) / step)
         return np.stack(columns, 1)
 
-    def distance_to(self, effect: str | None, iterations: int = 4) -> float:
+    def distance_to(self, effect: str | None, iterations: int = 4, beside: Unit | None = None) -> float:
         """Squared distance from the truth to the nearest point of a model with one effect (None: the nominal model).
+
+        ``beside`` are effects that the model has as well, at these values.
 
         Gauss-Newton on effect and nuisances with the nuisances' derivatives kept; what two runs of the same physics
         differ by is taken off.
@@ -196,14 +203,15 @@ class Detector:
         at = coordinates.start.copy() if coordinates else np.zeros(0)
 
         def predicted(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-            return self.shift(x, {coordinates.effect: coordinates.values(at)} if coordinates else {})
+            own = {coordinates.effect: coordinates.values(at)} if coordinates else {}
+            return self.shift(x, {**(beside or {}), **own})
 
-        here = predicted(x, at) if coordinates else np.zeros_like(self.delta)
+        here = predicted(x, at) if coordinates or beside else np.zeros_like(self.delta)
         cost = float(np.sum((self.delta - here) ** 2))
         for _ in range(iterations):
             design = self.jacobian
             if coordinates:
-                design = np.concatenate([design, self.columns(coordinates.effect, at, x, here)], 1)
+                design = np.concatenate([design, self.columns(coordinates.effect, at, x, here, beside)], 1)
             information = design.T @ design
             information[: len(x), : len(x)] += np.eye(len(x))
             gradient = design.T @ (self.delta - here)
@@ -231,7 +239,10 @@ class Detector:
             gain, (x, at, here, cost) = cost - new_cost, (new_x, new_at, there, new_cost)
             if gain < 0.5:
                 break
-        distance = max(0.0, min(cost - self.repeat, self._tolerance_cost(effect)))
+        distance = max(0.0, cost - self.repeat)
+        if beside:
+            return distance
+        distance = min(distance, self._tolerance_cost(effect))
         if coordinates is None:
             self.nominal = distance
         elif coordinates.effect != "compliance":  # every other effect can be off, which is the nominal model
@@ -265,17 +276,11 @@ class Detector:
             return self.squared(self.delta) + self.lattice
         return self.linear_distance(self.delta, self.columns(effect, COORDINATES[effect].start)) + self.lattice
 
-    def linear_swap(self, effect: str) -> float:
-        """First-order squared distance from a truth of several effects to the nearest with this one in place of one."""
-        effects = [e for e in self.case.effects if e != "speed_quantisation"]
-        found = []
-        for out in effects:
-            kept = {e: v for e, v in self.case.effects.items() if e != out}
-            design = [self.columns(e, COORDINATES[e].point(kept[e])) for e in effects if e != out]
-            design.append(self.columns(effect, COORDINATES[effect].start))
-            rest = self.delta - self.shift(None, kept)
-            found.append(max(0.0, self.linear_distance(rest, np.concatenate(design, 1)) - self.repeat))
-        return min(found)
+    def distance_in_place(self, effect: str) -> float:
+        """Squared distance from a truth of several effects to the nearest with this one in place of one of them, the
+        others as they are."""
+        truth = self.case.effects
+        return min(self.distance_to(effect, beside={e: truth[e] for e in truth if e != out}) for out in truth)
 
     def detectability(self) -> Detectability:
         """Distances that go into the key."""
