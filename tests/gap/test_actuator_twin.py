@@ -217,6 +217,36 @@ def test_derived_derivatives_agree_with_differences():
         assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(difference), rel=0.05)
 
 
+@pytest.mark.parametrize("effect", ["current_gain", "voltage_gain", "contact_resistance"])
+def test_all_phases_alike_are_another_unit(effect):
+    """A change of the three together is one of nuisances, and no fit tells them apart by differences that scatter."""
+    twin = ActuatorTwin(ACTUATOR, bench({}), NOISE, threads=1)
+    problem = Problem(twin, twin.names)
+    hypothesis = next(h for h in twin.hypotheses if h.effect == effect)
+    own = problem.effect_parameters(hypothesis)
+    values = np.array([p.off if p.effect else p.mean for p in problem.parameters])
+    if effect == "contact_resistance":
+        values[own] = 0.02  # of which there is no less than none
+    twin.settle(values, twin.names)
+    problem.set_covariance(values)
+    prediction = problem.predict(values)[0]
+    base = problem.nuisance_jacobian(values, prediction, problem.nuisances)
+    noisy = problem._effect_columns(problem.point(values, prediction, base, problem.nuisances), own)
+    exact = problem._together(values, base, noisy, [hypothesis])
+    weights = twin.weights_together(effect, values[own])
+    by_steps, known = problem.whiten(noisy @ weights), problem.whiten(exact @ weights)
+    assert by_steps @ known / np.linalg.norm(by_steps) / np.linalg.norm(known) > 0.97
+    assert np.linalg.norm(known) == pytest.approx(np.linalg.norm(by_steps), rel=0.05)
+    apart = np.array([1.0, -1.0, 0.0])  # what tells the phases apart is as it was
+    assert exact @ (apart / weights) == pytest.approx(noisy @ (apart / weights), rel=1e-6, abs=1e-9)
+    free = [*problem.nuisances, *own]
+    deviations = {}
+    for name, columns in (("noisy", noisy), ("exact", exact)):
+        covariance = problem.point(values, prediction, np.concatenate([base, columns], 1), free).covariance[-3:, -3:]
+        deviations[name] = np.sqrt(weights @ covariance @ weights) / (weights @ weights)
+    assert deviations["exact"] > 2.0 * deviations["noisy"]
+
+
 @pytest.mark.parametrize(
     ("effects", "named"),
     [

@@ -276,12 +276,35 @@ class Problem(Gaussian):
         own, widened = self.freed(chosen)
         point = candidate.point
         base = self.derivatives(point.values, point.prediction)
-        columns = self._effect_columns(point, own)
+        columns = self._together(point.values, base, self._effect_columns(point, own), chosen)
         jacobian = np.concatenate([base, columns], axis=1)
         start = self.point(point.values, point.prediction, jacobian, point.free, widened)
         best = self.unpulled(self.descend(start, widened), widened)
         gain = best.log_evidence - null.log_evidence
         return replace(candidate, point=best, gain=gain, signature=columns, polished=True)
+
+    def _together(
+        self, values: np.ndarray, base: np.ndarray, columns: np.ndarray, chosen: Sequence[Hypothesis]
+    ) -> np.ndarray:
+        """Columns (statistic, own) of one structural effect, with what the twin knows exactly of them put right.
+
+        A change of all phases alike may be a change of nuisances: in noisy differences it would feign to be told apart.
+        """
+        weights_of = getattr(self.twin, "weights_together", None)
+        structural = [h for h in chosen if h.kind != "calibration"]
+        if weights_of is None or len(structural) != 1:
+            return columns
+        effect = structural[0].effect
+        weights = weights_of(effect, values[self.effect_parameters(structural[0])])
+        if weights is None:
+            return columns
+        at = {self.parameters[m].name: c for c, m in enumerate(self.nuisances)}
+        exact = np.zeros(len(self.cells))
+        for name, rows in self.rows.items():
+            exact[rows] = self.twin.derive_together(  # type: ignore[attr-defined]
+                effect, values, lambda other, rows=rows: base[rows, at[other]], name
+            )
+        return columns + np.outer(exact - columns @ weights, weights) / float(weights @ weights)
 
     def _effect_columns(self, at: Point, own: Sequence[int]) -> np.ndarray:
         """(statistic, own) differences by the parameters of effects, simulated at a fit."""

@@ -203,6 +203,19 @@ def _by_recording(problem: Problem, rows: Sequence[str], names: Sequence[str], z
     return out
 
 
+def _counted(diagnosis: Diagnosis) -> str:
+    """What the gains over no effect do not show where the named one is a unit far outside its specification."""
+    found = diagnosis.found
+    if diagnosis.verdict["verdict"] not in NAMED or found.candidates[0].gain >= max(c.gain for c in found.candidates):
+        return ""
+    pulled = found.null.log_evidence - found.within.log_evidence
+    names = effect_words([h.effect for h in diagnosis.twin.hypotheses if h.effect in found.candidates[0].effects])
+    return (
+        f" All of them have {names} as far outside the specification, named or not, which alone gains "
+        f"{number(pulled)}; the others compete for what that leaves."
+    )
+
+
 def _which(page: Page, diagnosis: Diagnosis) -> None:
     verdict = diagnosis.verdict
     named = verdict["verdict"] in NAMED
@@ -228,7 +241,8 @@ def _which(page: Page, diagnosis: Diagnosis) -> None:
     page.figure(
         "which",
         figures.draw_ranking(entries),
-        "Every reading that was fitted with the simulator; probabilities are exclusive and sum to one.",
+        "Every reading that was fitted with the simulator; probabilities are exclusive and sum to one."
+        + _counted(diagnosis),
     )
     rows = []
     for entry in verdict["which"]:

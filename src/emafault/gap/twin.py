@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-SPREAD = 1.35  # of standardised errors on development cases: derivatives by simulation are a little noisy
+SPREAD = 1.13  # of standardised errors on development cases: derivatives by simulation are a little noisy
 INTERVAL = 1.645 * SPREAD  # standard deviations of a 90 % interval
 
 

@@ -18,7 +18,7 @@ from ..gap.twin import Cell
 from ..recording import Recording
 from .actuator_layout import COMMUTATION_AT, LATTICE, PER_PHASE, SIZE, SPECIFICATION, SPEED_AT, SUM_I_AT, cells_of
 from .actuator_noise import CHANNELS, channel_spread, covariance_by_channel, noise_covariance
-from .actuator_parameters import derive, hypotheses_of, parameters_of, report
+from .actuator_parameters import derive, derive_together, hypotheses_of, parameters_of, report, weights_together
 from .actuator_statistics import Computed, Nominal, compute
 
 MINIMUM_COUNT = 15  # samples behind a statistic that is used
@@ -196,6 +196,14 @@ class ActuatorTwin:
     def derive(self, name: str, values: np.ndarray, derivative, recording: str) -> np.ndarray:
         """Derivative of one recording's statistics by a parameter that acts only through others."""
         return derive(self.actuator, self.parameters, name, values, derivative, recording)
+
+    def weights_together(self, effect: str, values: np.ndarray) -> np.ndarray | None:
+        """(parameter of the effect,) of a change of all its phases whose derivative ``derive_together`` knows."""
+        return weights_together(effect, values)
+
+    def derive_together(self, effect: str, values: np.ndarray, derivative, recording: str) -> np.ndarray:
+        """Derivative of one recording's statistics by that change, from those by nuisances."""
+        return derive_together(self.actuator, self.parameters, effect, values, derivative, recording)
 
     # ---- statistics
     def cells(self, part: Sequence[str]) -> list[Cell]:

@@ -152,6 +152,47 @@ def derive(
     return out
 
 
+#: effect on the phases -> nuisances that a change of all three in common proportion is, to the first order, with signs:
+#: what is read as a larger current is a smaller R and L, and all that it drives is heavier
+_ALIKE = {
+    "current_gain": {"unit_calibration.R_scale": -1.0, "inductance_tolerance.L_scale": -1.0},
+    "voltage_gain": {
+        "unit_calibration.R_scale": 1.0,
+        "unit_calibration.k_scale": 1.0,
+        "inductance_tolerance.L_scale": 1.0,
+    },
+}
+_DRIVEN = ("inertia.scale", "friction_level.scale", "viscous_friction.scale")
+
+
+def weights_together(effect: str, values: np.ndarray) -> np.ndarray | None:
+    """(parameter of the effect,) how each moves where all its phases change together; None for other effects."""
+    if effect == "contact_resistance":
+        return np.ones(len(values))
+    return values.copy() if effect in _ALIKE else None
+
+
+def derive_together(
+    actuator: ActuatorParameters,
+    parameters: Sequence[Parameter],
+    effect: str,
+    values: np.ndarray,
+    derivative: Callable[[str], np.ndarray],
+    recording: str,
+) -> np.ndarray:
+    """Derivative of one recording's statistics by a change of all phases of an effect together (see ``derive``).
+
+    Three phases' resistances are one of the winding, which copper's temperature does not change; their gains are other
+    constants of the unit.
+    """
+    at = {p.name: float(v) for p, v in zip(parameters, values, strict=True)}
+    if effect == "contact_resistance":
+        warm = 1.0 + actuator.copper_coefficient * at[f"{recording}.dT"]
+        return derivative("unit_calibration.R_scale") / (actuator.resistance * warm)
+    signs = _ALIKE[effect] | dict.fromkeys(_DRIVEN, 1.0)
+    return np.sum([sign * at[name] * derivative(name) for name, sign in signs.items()], axis=0)
+
+
 def hypotheses_of(
     parameters: Sequence[Parameter], effects: Mapping[str, Effect], spacings: Sequence[float]
 ) -> list[Hypothesis]:
