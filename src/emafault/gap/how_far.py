@@ -10,6 +10,8 @@ from .inference import Candidate, Problem
 from .twin import Twin
 
 PLACEBOS = 20
+ROUNDS = 4  # of a refit on the confirm recordings
+NEAR = 0.7  # of what a round began with: where less is left, it has moved so far that derivatives are taken anew
 
 
 @dataclass(frozen=True)
@@ -37,17 +39,14 @@ def refit(problem: Problem, values: np.ndarray, free: Sequence[int]) -> Rung:
     prediction = problem.predict(values)[0]
     deviations: dict[int, float] = {}
     if free:
-        jacobian = problem.nuisance_jacobian(values, prediction, free, exact=False)
-        for _ in range(2):
-            moved = problem.solve(values, prediction, jacobian, free)
-            trial = problem.predict(moved)[0]
-            old, new = (float(np.square(problem.whiten(problem.observed - q)).sum()) for q in (prediction, trial))
-            if new >= old:
+        for _ in range(ROUNDS):
+            jacobian = problem.nuisance_jacobian(values, prediction, free, exact=False)
+            start = problem.point(values, prediction, jacobian, free)
+            best = problem.descend(start, iterations=2)
+            values, prediction = best.values, best.prediction
+            deviations = dict(zip(free, np.sqrt(np.diag(best.covariance)).tolist(), strict=True))
+            if best.objective > NEAR * start.objective:
                 break
-            values, prediction = moved, trial
-        whitened, (_, sd) = problem.whiten(jacobian), problem.prior(free)
-        covariance = np.linalg.inv(whitened.T @ whitened + np.diag(1.0 / sd**2))
-        deviations = dict(zip(free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     residual = problem.whiten(problem.observed - prediction)
     return Rung(float(np.sqrt(np.mean(residual**2))), values, residual, deviations)
 
