@@ -1,4 +1,6 @@
-"""Fits that would stop on their way."""
+"""Fits that would stop on their way: on the confirm recordings, of a set's parts, and on averaged predictions."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,8 +8,9 @@ import pytest
 from emafault.gap.how_far import refit
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Parameter
+from emafault.gap.which import _averaged, _deserved
 
-from .test_inference import Lines
+from .test_inference import Lines, Scattering
 
 
 class Faulty(Lines):
@@ -36,3 +39,49 @@ def test_a_fault_of_a_confirm_recording_is_fitted_to_the_end(fault):
     found = refit(confirm, null.values, [4])
     assert found.values[4] == pytest.approx(fault, abs=0.3)
     assert found.rms < 1.3
+
+
+def fitted(twin, effects):
+    """Null and a set fitted to the end, both recordings, and the twin's library."""
+    problem, by_id = Problem(twin, ["one", "two"]), {h.effect: h for h in twin.hypotheses}
+    null = problem.fit_null()
+    chosen = [by_id[e] for e in effects]
+    signatures = {c.effects[0]: c.signature for c in problem.screen(null, twin.hypotheses)}
+    start = problem.linear(
+        null, chosen, null.values, null.prediction, np.concatenate([signatures[e] for e in effects], axis=1)
+    )
+    return problem, null, problem.polish(null, start, by_id), by_id
+
+
+def test_a_part_that_was_left_behind_early_leads_again_where_it_does_as_well():
+    twin = Lines(4, curvature=1.0)
+    problem, null, pair, by_id = fitted(twin, ("curve", "step"))
+    ranked = _deserved(problem, null, [pair], by_id, 3.0)
+    assert [c.effects for c in ranked] == [("curve",), ("curve", "step")]
+    assert ranked[0].gain > pair.gain - 3.0 and ranked[0].polished
+
+
+def test_a_set_of_which_every_part_lacks_something_stays():
+    twin = Lines(4, curvature=1.0, step=0.8)
+    problem, null, pair, by_id = fitted(twin, ("curve", "step"))
+    assert _deserved(problem, null, [pair], by_id, 3.0) == [pair]
+
+
+class Averaging(Scattering):
+    """A twin that can average its scatter."""
+
+    def smooth(self, values, part):
+        return Lines.predict(self, values, part)[0]
+
+
+def test_an_averaged_set_explains_no_less_than_the_null_that_it_contains():
+    twin = Averaging(6, curvature=1.0)
+    twin.parameters = [replace(p, amplitude=p.effect is not None) for p in twin.parameters]
+    problem, null, found, by_id = fitted(twin, ("curve",))
+    astray = found.point.values + np.array([0.5, -0.5, -3.0, 0.0])
+    stuck = problem.point(astray, problem.predict(astray)[0], 1e-9 * found.point.jacobian, found.point.free)
+    assert problem.averaged(stuck, [by_id["curve"]]).objective > null.objective  # it finds no way from there
+    held = _averaged(problem, null, replace(found, point=stuck, gain=20.0), by_id)
+    assert held.point.objective <= null.objective
+    led = replace(problem.point(astray, problem.predict(astray)[0], found.point.jacobian, found.point.free))
+    assert _averaged(problem, null, replace(found, point=led, gain=20.0), by_id).gain > 15.0

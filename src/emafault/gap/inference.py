@@ -130,6 +130,18 @@ class Problem(Gaussian):
         start = self.point(point.values, self._smooth(point.values), point.jacobian, point.free, widened)
         return self.descend(start, widened, AVERAGED_STEPS, self._smooth)
 
+    def averaged_from(self, null: Point, point: Point, chosen: Sequence[Hypothesis]) -> Point:
+        """A set's fit on averaged predictions begun where that of the null ended, its amplitudes at zero.
+
+        The set contains the null: a fit that ended above it has stopped on its way.
+        """
+        own, widened = self.freed(chosen)
+        values = null.values.copy()
+        for m in own:
+            values[m] = self.parameters[m].off if self.parameters[m].amplitude else point.values[m]
+        start = self.point(values, null.prediction, point.jacobian, point.free, widened)
+        return self.descend(start, widened, AVERAGED_STEPS, self._smooth)
+
     def _smooth(self, values: np.ndarray) -> np.ndarray:
         return self.twin.smooth(values, self.part)  # type: ignore[attr-defined]
 

@@ -58,9 +58,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     def accept(candidates: Iterable[Candidate]) -> None:
         for candidate in candidates:
             key = tuple(sorted(candidate.effects))
-            if any(by_id[e].kind == "calibration" and not far_outside(problem, by_id[e], candidate.point) for e in key):
-                continue
-            if not of_size(problem, candidate, by_id):
+            if not _admissible(problem, candidate, by_id):
                 continue
             if key not in tried or candidate.gain > tried[key].gain:
                 tried[key] = candidate
@@ -126,6 +124,12 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
     return Search(null, candidates, singles, left, unfitted, within)
 
 
+def _admissible(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
+    """Whether each member of a set is there at all: no effect negligible, a calibration effect far outside."""
+    units = [by_id[e] for e in candidate.effects if by_id[e].kind == "calibration"]
+    return all(far_outside(problem, h, candidate.point) for h in units) and of_size(problem, candidate, by_id)
+
+
 def _concluded(
     problem: Problem, null: Point, candidates: list[Candidate], by_id: dict[str, Hypothesis], addition: float
 ) -> tuple[Point, list[Candidate]]:
@@ -139,7 +143,7 @@ def _concluded(
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
         candidates = [c for c in candidates if sound(problem, c, by_id)]
     if candidates:
-        candidates = _deserved(problem, null, candidates, by_id)
+        candidates = _deserved(problem, null, candidates, by_id, addition)
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
         candidates = [c for c in candidates if sound(problem, c, by_id)]
     return null, candidates
@@ -199,7 +203,7 @@ def _null_again(
     values[own] = first.point.values[own]
     point = problem.resumed(first.point, values, widened)
     if averaged and problem.scatters:
-        point = problem.averaged(point, chosen)
+        point = _averaged_point(problem, again, point, chosen)
     if point.objective < first.point.objective:
         first = replace(first, point=point, gain=point.log_evidence - again.log_evidence)
     return again, [first, *rest]
@@ -228,7 +232,9 @@ def _fitted_alike(
     return _ranked([*done, *(c for c in ranked if not any(c is r for r in rivals))], addition)
 
 
-def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis]) -> list[Candidate]:
+def _deserved(
+    problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis], addition: float
+) -> list[Candidate]:
     """Give way to a smaller set where what the larger one adds is little of what the smaller one leaves.
 
     A cause written in another form leaves a remainder, and some other effect always takes a little of it up.
@@ -238,12 +244,20 @@ def _deserved(problem: Problem, null: Point, ranked: list[Candidate], by_id: dic
         before, after = problem.excess(part.point), problem.excess(whole.point)
         return before - after < DESERVED * before
 
-    while ranked[0].polished:
-        members = set(ranked[0].effects)
-        part = next((c for c in ranked[1:] if set(c.effects) < members and idle(c, ranked[0])), None)
-        if part is None:
+    while ranked[0].polished and len(ranked[0].effects) > 1:
+        whole = ranked[0]
+        # of a part that was left behind early nobody knows how well it fits
+        again = problem.refine_all(null, [(part, 2) for part in _parts(problem, null, whole, by_id)], by_id)
+        if problem.scatters:
+            near = [c for c in again if c.gain > whole.gain - WITHIN_LUCK]
+            again = [_averaged(problem, null, c, by_id) if any(c is n for n in near) else c for c in again]
+        parts = [c for c in ranked[1:] if set(c.effects) < set(whole.effects)]
+        parts += [c for c in again if _admissible(problem, c, by_id)]
+        found = [c for c in sorted(parts, key=lambda c: -c.gain) if idle(c, whole) or whole.gain < c.gain + addition]
+        if not found:
             break
-        ranked = [_finished(problem, null, part, by_id), *(c for c in ranked if c is not part)]
+        first = _finished(problem, null, found[0], by_id)
+        ranked = [first, *(c for c in ranked if set(c.effects) != set(first.effects))]
     return ranked
 
 
@@ -255,8 +269,22 @@ def _finished(problem: Problem, null: Point, candidate: Candidate, by_id: dict[s
 
 def _averaged(problem: Problem, null: Point, candidate: Candidate, by_id: dict[str, Hypothesis]) -> Candidate:
     """The candidate with its prediction averaged over the scatter of single ones."""
-    point = problem.averaged(candidate.point, [by_id[e] for e in candidate.effects])
+    chosen = [by_id[e] for e in candidate.effects]
+    fallen = candidate.gain - LUCK if candidate.gain < WITHIN_LUCK else -np.inf
+    point = _averaged_point(problem, null, candidate.point, chosen, fallen)
     return replace(candidate, point=point, gain=point.log_evidence - null.log_evidence)
+
+
+def _averaged_point(
+    problem: Problem, null: Point, point: Point, chosen: Sequence[Hypothesis], least: float = -np.inf
+) -> Point:
+    """A set's fit averaged over the scatter; begun at the null's once more where it ends above that, or with less than
+    ``least`` gain: the set contains the null, and a single prediction may have led astray."""
+    found = problem.averaged(point, chosen)
+    if found.objective > null.objective or found.log_evidence - null.log_evidence < least:
+        nested = problem.averaged_from(null, found, chosen)
+        found = nested if nested.objective < found.objective else found
+    return found
 
 
 def _without_luck(
@@ -325,22 +353,27 @@ def _grow(
     return sorted(grown.values(), key=lambda c: -c.gain)[:REFINED_PAIRS]
 
 
+def _parts(problem: Problem, null: Point, whole: Candidate, by_id: dict[str, Hypothesis]) -> list[Candidate]:
+    """A set without each of its members, linearised about where it ended."""
+    out = []
+    for effect in whole.effects:
+        kept = tuple(e for e in whole.effects if e != effect)
+        chosen = [by_id[e] for e in kept]
+        own, _ = problem.freed(chosen)
+        begin = whole.point.values.copy()
+        for m in problem.effect_parameters(by_id[effect]):
+            begin[m] = problem.mean[m] if by_id[effect].kind == "calibration" else problem.parameters[m].off
+        signature = whole.point.jacobian[:, [whole.point.free.index(m) for m in own]]
+        out.append(problem.linear(null, chosen, begin, problem.predict(begin)[0], signature))
+    return out
+
+
 def _prune(problem: Problem, null: Point, tried: dict, by_id: dict[str, Hypothesis], accept) -> None:
     """Refit the best set without each of its members from where it ended: a member may be idle, or have only helped
     the others on their way."""
     best = max(tried.values(), key=lambda c: c.gain, default=None)
     while best is not None and len(best.effects) > 1:
-        smaller = []
-        for effect in best.effects:
-            kept = tuple(e for e in best.effects if e != effect)
-            chosen = [by_id[e] for e in kept]
-            own, _ = problem.freed(chosen)
-            begin = best.point.values.copy()
-            for m in problem.effect_parameters(by_id[effect]):
-                begin[m] = problem.mean[m] if by_id[effect].kind == "calibration" else problem.parameters[m].off
-            signature = best.point.jacobian[:, [best.point.free.index(m) for m in own]]
-            candidate = problem.linear(null, chosen, begin, problem.predict(begin)[0], signature)
-            smaller.append((candidate, 2))
+        smaller = [(part, 2) for part in _parts(problem, null, best, by_id)]
         accept(problem.refine_all(null, smaller, by_id))
         top = max(tried.values(), key=lambda c: c.gain)
         if top is best:
