@@ -7,8 +7,8 @@ import pytest
 
 from emafault.gap.how_far import refit
 from emafault.gap.inference import Problem
-from emafault.gap.twin import Parameter
-from emafault.gap.which import _averaged, _deserved
+from emafault.gap.twin import Hypothesis, Parameter
+from emafault.gap.which import _averaged, _deserved, _with_outside
 
 from .test_inference import Lines, Scattering
 
@@ -65,6 +65,17 @@ def test_a_set_of_which_every_part_lacks_something_stays():
     twin = Lines(4, curvature=1.0, step=0.8)
     problem, null, pair, by_id = fitted(twin, ("curve", "step"))
     assert _deserved(problem, null, [pair], by_id, 3.0) == [pair]
+
+
+@pytest.mark.parametrize(("tolerance", "named"), [(0.02, ("curve", "slope")), (0.5, ("curve",))])
+def test_what_a_set_has_far_outside_its_tolerance_is_a_cause_beside_it(tolerance, named):
+    twin = Lines(4, curvature=1.0)  # of slope 1.2
+    twin.parameters[1] = replace(twin.parameters[1], sd=tolerance, specified="line")
+    twin.hypotheses = [*twin.hypotheses, Hypothesis("slope", ("line",), ("unit.slope",), (), "calibration")]
+    problem, null, curve, by_id = fitted(twin, ("curve",))
+    ranked = _with_outside(problem, null, [curve], by_id, 3.0)
+    assert ranked[0].effects == named and ranked[-1] is curve
+    assert ranked[0].gain >= curve.gain + 3.0 * (len(named) - 1)
 
 
 class Averaging(Scattering):

@@ -13,6 +13,7 @@ from .twin import Hypothesis
 
 REFINED_SINGLES = 5
 REFINED_PAIRS = 3
+LARGEST = 3  # effects of a set
 STRONG = 30.0  # gain above which covariance and derivatives are taken anew at the best single effect
 REBASES = 3
 CLOSE = 1000.0  # gain below which the empty set is fitted a second time: it may have stopped on its way
@@ -89,7 +90,7 @@ def search(problem: Problem, hypotheses: Sequence[Hypothesis], addition: float) 
         beam = _best(tried, 1)[:2]
         if not beam or beam[0].point.misfit > 0.8 * before or beam[0].point.misfit < 1.2 * len(problem.cells):
             break
-    for size in (2, 3):
+    for size in range(2, LARGEST + 1):
         grown = _grow(problem, null, beam, singles, by_id, addition)
         if not grown:
             break
@@ -138,6 +139,7 @@ def _concluded(
     least = -LUCK if problem.scatters else HOPELESS
     if candidates and candidates[0].gain > least:
         candidates = _fitted_alike(problem, null, candidates, by_id, addition)
+        candidates = _with_outside(problem, null, candidates, by_id, addition)
         null, candidates = _null_again(problem, null, candidates, by_id)
     if candidates and candidates[0].gain > least:
         null, candidates = _without_luck(problem, null, candidates, by_id, addition)
@@ -147,6 +149,28 @@ def _concluded(
         null, candidates = _null_again(problem, null, candidates, by_id, candidates[0].gain < WITHIN_LUCK)
         candidates = [c for c in candidates if sound(problem, c, by_id)]
     return null, candidates
+
+
+def _with_outside(
+    problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis], addition: float
+) -> list[Candidate]:
+    """The candidates, and the first one together with what it has far outside the unit's tolerances.
+
+    That is a cause as well. While a set was still on its way it could not be told from what the fit lacked.
+    """
+    first = ranked[0] if ranked else None
+    far = [e for e in outside(problem, first.point, by_id) if e not in first.effects] if first else []
+    if first is None or not 0 < len(far) <= LARGEST - len(first.effects):
+        return ranked
+    effects = (*first.effects, *far)
+    _, widened = problem.freed([by_id[e] for e in effects])
+    point = problem.resumed(first.point, first.point.values, widened)
+    whole = replace(first, effects=effects, point=point, gain=point.log_evidence - null.log_evidence)
+    if not _admissible(problem, whole, by_id):
+        return ranked
+    others = [c for c in ranked if set(c.effects) != set(effects)]
+    same = [c for c in ranked if set(c.effects) == set(effects)]
+    return _ranked([max([whole, *same], key=lambda c: c.gain), *others], addition)
 
 
 def _outside(problem: Problem, null: Point, by_id: dict[str, Hypothesis]) -> Candidate | None:
