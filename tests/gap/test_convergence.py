@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emafault.gap.conclude import averaged_fit, deserved, with_outside
 from emafault.gap.how_far import refit
 from emafault.gap.inference import Problem
 from emafault.gap.twin import Hypothesis, Parameter
-from emafault.gap.which import _averaged, _deserved, _with_outside
 
 from .test_inference import Lines, Scattering
 
@@ -56,7 +56,7 @@ def fitted(twin, effects):
 def test_a_part_that_was_left_behind_early_leads_again_where_it_does_as_well():
     twin = Lines(4, curvature=1.0)
     problem, null, pair, by_id = fitted(twin, ("curve", "step"))
-    ranked = _deserved(problem, null, [pair], by_id, 3.0)
+    ranked = deserved(problem, null, [pair], by_id, 3.0)
     assert [c.effects for c in ranked] == [("curve",), ("curve", "step")]
     assert ranked[0].gain > pair.gain - 3.0 and ranked[0].polished
 
@@ -64,7 +64,7 @@ def test_a_part_that_was_left_behind_early_leads_again_where_it_does_as_well():
 def test_a_set_of_which_every_part_lacks_something_stays():
     twin = Lines(4, curvature=1.0, step=0.8)
     problem, null, pair, by_id = fitted(twin, ("curve", "step"))
-    assert _deserved(problem, null, [pair], by_id, 3.0) == [pair]
+    assert deserved(problem, null, [pair], by_id, 3.0) == [pair]
 
 
 @pytest.mark.parametrize(("tolerance", "named"), [(0.02, ("curve", "slope")), (0.5, ("curve",))])
@@ -73,7 +73,7 @@ def test_what_a_set_has_far_outside_its_tolerance_is_a_cause_beside_it(tolerance
     twin.parameters[1] = replace(twin.parameters[1], sd=tolerance, specified="line")
     twin.hypotheses = [*twin.hypotheses, Hypothesis("slope", ("line",), ("unit.slope",), (), "calibration")]
     problem, null, curve, by_id = fitted(twin, ("curve",))
-    ranked = _with_outside(problem, null, [curve], by_id, 3.0)
+    ranked = with_outside(problem, null, [curve], by_id, 3.0)
     assert ranked[0].effects == named and ranked[-1] is curve
     assert ranked[0].gain >= curve.gain + 3.0 * (len(named) - 1)
 
@@ -92,7 +92,7 @@ def test_an_averaged_set_explains_no_less_than_the_null_that_it_contains():
     astray = found.point.values + np.array([0.5, -0.5, -3.0, 0.0])
     stuck = problem.point(astray, problem.predict(astray)[0], 1e-9 * found.point.jacobian, found.point.free)
     assert problem.averaged(stuck, [by_id["curve"]]).objective > null.objective  # it finds no way from there
-    held = _averaged(problem, null, replace(found, point=stuck, gain=20.0), by_id)
+    held = averaged_fit(problem, null, replace(found, point=stuck, gain=20.0), by_id)
     assert held.point.objective <= null.objective
     led = replace(problem.point(astray, problem.predict(astray)[0], found.point.jacobian, found.point.free))
-    assert _averaged(problem, null, replace(found, point=led, gain=20.0), by_id).gain > 15.0
+    assert averaged_fit(problem, null, replace(found, point=led, gain=20.0), by_id).gain > 15.0

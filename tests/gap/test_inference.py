@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emafault.gap.conclude import fitted_alike
 from emafault.gap.decide import UNCALIBRATED, Calibration, decide, evidence_of, share_left
 from emafault.gap.groups import groups
 from emafault.gap.how_far import Ladder, closed, left_open, refit, square_error
@@ -13,7 +14,7 @@ from emafault.gap.misfit import MOST, SPECIFICATION, families, left_where_acting
 from emafault.gap.sizes import outside
 from emafault.gap.twin import Cell, Hypothesis, Parameter
 from emafault.gap.where import beyond_specification, equation_of
-from emafault.gap.which import _fitted_alike, search
+from emafault.gap.which import search
 
 
 class Lines:
@@ -421,7 +422,7 @@ def test_a_rival_is_not_outdone_for_lack_of_convergence():
     short = replace(bend, point=short, gain=short.log_evidence - null.log_evidence)
     assert curve.gain - short.gain > 5.0
     assert len(groups(problem, null, [curve, short])[0]) == 1
-    ranked = _fitted_alike(problem, null, [curve, short], by_id, 3.0)
+    ranked = fitted_alike(problem, null, [curve, short], by_id, 3.0)
     assert {c.effects for c in groups(problem, null, ranked)[0]} == {("curve",), ("bend",)}
 
 
@@ -477,7 +478,7 @@ def test_an_effect_that_goes_off_in_the_very_last_fit_is_no_candidate_either(mon
     twin = Lines(17, curvature=1.0)
     twin.parameters = [replace(p, amplitude=p.effect is not None) for p in twin.parameters]
     assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates
-    monkeypatch.setattr("emafault.gap.which._null_again", off_at_last)
+    monkeypatch.setattr("emafault.gap.conclude.null_again", off_at_last)
     assert search(Problem(twin, ["one", "two"]), twin.hypotheses, 3.0).candidates == []
 
 

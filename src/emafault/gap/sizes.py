@@ -57,13 +57,19 @@ def outside(problem: Problem, point: Point, by_id: Mapping[str, Hypothesis]) -> 
     return [e for e, h in by_id.items() if h.kind == "calibration" and far_outside(problem, h, point)]
 
 
-def of_size(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
+def of_size(problem: Problem, candidate: Candidate, by_id: Mapping[str, Hypothesis]) -> bool:
     """Whether no member of a candidate is negligible."""
     return not any(negligible(problem, by_id[e], candidate.point) for e in candidate.effects)
 
 
-def sound(problem: Problem, candidate: Candidate, by_id: dict[str, Hypothesis]) -> bool:
+def sound(problem: Problem, candidate: Candidate, by_id: Mapping[str, Hypothesis]) -> bool:
     """Whether each member of a candidate is as large as it ever is, and no larger."""
     return of_size(problem, candidate, by_id) and not any(
         at_edge(problem, by_id[e], candidate.point) for e in candidate.effects
     )
+
+
+def admissible(problem: Problem, candidate: Candidate, by_id: Mapping[str, Hypothesis]) -> bool:
+    """Whether each member of a set is there at all: no effect negligible, a calibration effect far outside."""
+    units = [by_id[e] for e in candidate.effects if by_id[e].kind == "calibration"]
+    return all(far_outside(problem, h, candidate.point) for h in units) and of_size(problem, candidate, by_id)
