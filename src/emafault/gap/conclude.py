@@ -108,9 +108,11 @@ def with_outside(
 
     That is a cause as well. While a set was still on its way it could not be told from what the fit lacked.
     """
-    first = ranked[0] if ranked else None
-    far = [e for e in outside(problem, first.point, by_id) if e not in first.effects] if first else []
-    if first is None or not 0 < len(far) <= LARGEST - len(first.effects):
+    if not ranked:
+        return ranked
+    first = ranked[0]
+    far = [e for e in outside(problem, first.point, by_id) if e not in first.effects]
+    if not 0 < len(far) <= LARGEST - len(first.effects):
         return ranked
     effects = (*first.effects, *far)
     _, widened = problem.freed([by_id[e] for e in effects])
@@ -166,8 +168,7 @@ def deserved(
         # of a part that was left behind early nobody knows how well it fits
         again = problem.refine_all(null, [(part, 2) for part in parts_of(problem, null, whole, by_id)], by_id)
         if problem.scatters:
-            near = [c for c in again if c.gain > whole.gain - WITHIN_LUCK]
-            again = [averaged_fit(problem, null, c, by_id) if any(c is n for n in near) else c for c in again]
+            again = [averaged_fit(problem, null, c, by_id) if c.gain > whole.gain - WITHIN_LUCK else c for c in again]
         parts = [c for c in ranked[1:] if set(c.effects) < set(whole.effects)]
         parts += [c for c in again if admissible(problem, c, by_id)]
         found = [c for c in sorted(parts, key=lambda c: -c.gain) if idle(c, whole) or whole.gain < c.gain + addition]
