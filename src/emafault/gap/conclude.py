@@ -154,7 +154,8 @@ def without_luck(
 def deserved(
     problem: Problem, null: Point, ranked: list[Candidate], by_id: dict[str, Hypothesis], addition: float
 ) -> list[Candidate]:
-    """Give way to a smaller set where what the larger one adds is little of what the smaller one leaves.
+    """Give way to a part of the first set, fitted again from where the set ended, where what the whole adds is little
+    of what the part leaves, or less evidence than one more effect must bring (``addition``).
 
     A cause written in another form leaves a remainder, and some other effect always takes a little of it up.
     """
