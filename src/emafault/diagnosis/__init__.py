@@ -1,0 +1,1 @@
+"""The diagnosis of the sim-to-real gap; it knows no machine."""

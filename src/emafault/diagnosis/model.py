@@ -1,0 +1,63 @@
+"""What the diagnosis needs of a machine: parameters with priors, candidate units, and equations as blocks of rows."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: value at which it does nothing, prior mean and standard deviation where it is free."""
+
+    name: str
+    off: float
+    mean: float
+    sd: float
+    units: str = ""
+    alias: str | None = None  # a nuisance whose column this one is: the same quantity beyond its tolerance
+    secant: Mapping[str, float] | None = None  # values at which a secant stands for a derivative
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way in which a unit enters the linear model: its parameters and the side of off each lies on (0: either)."""
+
+    parameters: Sequence[Parameter]
+    signs: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A listed effect, a described form or an equation's remainder: what a set holds or does not."""
+
+    id: str
+    kind: str  # structural | calibration | form | remainder
+    equations: tuple[str, ...]
+    variants: Sequence[Variant]
+    on: Variant | None = None  # once its own parameters are at a point where it acts
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """Every parameter of every variant."""
+        every = [p for v in self.variants for p in v.parameters]
+        return every + [p for p in (self.on.parameters if self.on else ()) if p not in every]
+
+
+@dataclass
+class Block:
+    """Rows of one equation in one recording.
+
+    ``residual`` (row,), ``columns`` parameter -> scalar or (row,), ``bands`` diagonals of the noise's covariance
+    (main first), ``usable`` (row,) bool, ``coordinates`` name -> (row,), with ``phi`` (function, row) and ``drivers``
+    (driver, row) for remainders.
+    """
+
+    recording: str
+    equation: str
+    residual: np.ndarray
+    columns: dict
+    bands: list[np.ndarray]
+    usable: np.ndarray
+    coordinates: dict = field(default_factory=dict)

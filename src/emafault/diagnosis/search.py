@@ -1,0 +1,214 @@
+"""The posterior over sets of listed effects, described forms and equations with a remainder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from .evidence import Reduced, log_evidence
+from .model import Unit
+
+SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
+FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
+REMAINDER_PRIOR = 0.05  # of each equation to have one
+WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
+REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
+BEAM = 4
+SWAPPED = 10  # units tried in the place of each member
+NEAR = 12.0  # log posterior within which a set is worth extending
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One unit in a set: which of its variants, how wide its prior."""
+
+    unit: str
+    variant: int
+    width: float
+
+
+@dataclass
+class Model:
+    """A set with its log posterior (up to a constant), fitted deviations and their standard deviations."""
+
+    choices: tuple[Choice, ...]
+    log_posterior: float
+    log_likelihood: float
+    deviations: dict[str, float]
+    spread: dict[str, float]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Ids, sorted."""
+        return tuple(sorted(c.unit for c in self.choices))
+
+
+@dataclass
+class Candidate:
+    """A unit's variant ready for the linear model: indices, prior deviation and standard deviation, sides."""
+
+    index: np.ndarray
+    mean: np.ndarray
+    sd: np.ndarray
+    signs: np.ndarray
+    widths: tuple[float, ...]
+    names: list[str]
+    extra: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # own form
+    extra_sd: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+class Search:
+    """Beam search with additions, removals and swaps over a linearised model."""
+
+    def __init__(self, reduced: Reduced, units: Sequence[Unit], candidates: dict[tuple[str, int], Candidate]):
+        self.reduced = reduced
+        self.units = {u.id: u for u in units}
+        self.candidates = candidates
+        self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
+        self.tempering = 1.0
+
+    # ---- one set
+    def fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None = None) -> Model:
+        """The set's posterior, each member's width the best of its mixture."""
+        members = tuple(sorted(members))
+        if members in self.seen:
+            return self.seen[members]
+        width = {m: (widths or {}).get(m) or self._usual(m) for m in members}
+        best = self._evidence(members, width)
+        for m in members:
+            if (widths or {}).get(m) is None and len(self.candidates[m].widths) > 1:
+                best, width = self._widen(members, m, width, best)
+        value, index, mean, deviation = best
+        value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
+        value -= sum(np.log(self.variants(m[0])) for m in members)
+        names = [self.reduced.names[k] for k in index]
+        model = Model(
+            tuple(Choice(m[0], m[1], width[m]) for m in members),
+            self.tempering * value + self.log_prior(members),
+            value,
+            dict(zip(names, mean.tolist(), strict=True)),
+            dict(zip(names, deviation.tolist(), strict=True)),
+        )
+        self.seen[members] = model
+        return model
+
+    def _usual(self, m: tuple[str, int]) -> float:
+        widths = self.candidates[m].widths
+        return widths[len(widths) // 2]
+
+    def _widen(self, members, m, width, best):
+        """The best width of one member's prior: uphill over its grid from the usual one."""
+        grid = self.candidates[m].widths
+        at = grid.index(width[m])
+        for step in (1, -1):
+            k = at + step
+            moved = False
+            while 0 <= k < len(grid):
+                trial = {**width, m: grid[k]}
+                found = self._evidence(members, trial)
+                if found[0] <= best[0]:
+                    break
+                best, width, moved = found, trial, True
+                k += step
+            if moved:
+                break
+        return best, width
+
+    def variants(self, unit: str) -> int:
+        """Number of variants of a unit."""
+        return sum(1 for u, _ in self.candidates if u == unit)
+
+    def _evidence(self, members, width):
+        index, mean, sd, signs = [], [], [], []
+        for m in members:
+            c = self.candidates[m]
+            index += [c.index, c.extra]
+            mean += [c.mean, np.zeros(len(c.extra))]
+            sd += [c.sd * width[m], c.extra_sd]
+            signs += [c.signs, np.zeros(len(c.extra), int)]
+        if not members:
+            value, found, deviation = log_evidence(self.reduced, np.zeros(0, int), np.zeros(0), np.zeros(0))
+            return value, np.zeros(0, int), found, deviation
+        free = np.concatenate(index)
+        value, found, deviation = log_evidence(
+            self.reduced, free, np.concatenate(mean), np.concatenate(sd), np.concatenate(signs)
+        )
+        return value, free, found, deviation
+
+    def log_prior(self, members: Sequence[tuple[str, int]]) -> float:
+        """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size."""
+        kinds = [self.units[u].kind for u, _ in members]
+        listed = sum(k in ("structural", "calibration") for k in kinds)
+        forms, left = kinds.count("form"), kinds.count("remainder")
+        every = [u.kind for u in self.units.values()]
+        n_listed = sum(k in ("structural", "calibration") for k in every)
+        n_forms, n_left = every.count("form"), every.count("remainder")
+        if listed >= len(SIZE_PRIOR) or forms >= len(FORM_PRIOR):
+            return -np.inf
+        value = np.log(SIZE_PRIOR[listed]) - _log_choose(n_listed, listed)
+        value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
+        return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
+
+    # ---- the search
+    def run(self, rounds: int = 8) -> list[Model]:
+        """Every set looked at, most probable first."""
+        self.fit(())
+        extended: set = set()
+        for _ in range(rounds):
+            ranked = self.ranked()
+            todo = [m for m in ranked[: 4 * BEAM] if m.log_posterior > ranked[0].log_posterior - NEAR]
+            todo = [m for m in todo if m.choices not in extended][:BEAM]
+            if not todo:
+                break
+            for model in todo:
+                extended.add(model.choices)
+                self._extend(model)
+        return self.ranked()
+
+    def ranked(self) -> list[Model]:
+        """Sets seen, most probable first."""
+        return sorted((m for m in self.seen.values() if np.isfinite(m.log_posterior)), key=lambda m: -m.log_posterior)
+
+    def _extend(self, model: Model) -> None:
+        inside = tuple((c.unit, c.variant) for c in model.choices)
+        widths = {(c.unit, c.variant): c.width for c in model.choices}
+        names = {u for u, _ in inside}
+        added = []
+        for m in self.candidates:
+            grown = (*inside, m)
+            if m[0] not in names and np.isfinite(self.log_prior(grown)):
+                added.append((self.fit(grown, widths).log_posterior, m))
+        worth = [m for _, m in sorted(added, key=lambda x: -x[0])[:SWAPPED]]
+        for out in inside:
+            kept = tuple(m for m in inside if m != out)
+            self.fit(kept, widths)
+            others = [m for m in self.candidates if m[0] == out[0] and m != out]
+            for m in [*worth, *others]:
+                swapped = (*kept, m)
+                if np.isfinite(self.log_prior(swapped)):
+                    self.fit(swapped, widths)
+
+
+def _log_choose(n: int, k: int) -> float:
+    return float(np.sum(np.log(np.arange(n - k + 1, n + 1)))) - float(np.sum(np.log(np.arange(1, k + 1))))
+
+
+def inclusion(models: Sequence[Model]) -> dict[str, float]:
+    """Marginal posterior probability of each unit over the sets seen."""
+    weights = posterior(models)
+    out: dict[str, float] = {}
+    for m, w in zip(models, weights, strict=True):
+        for u in m.units:
+            out[u] = out.get(u, 0.0) + float(w)
+    return out
+
+
+def posterior(models: Sequence[Model]) -> np.ndarray:
+    """(model,) probabilities."""
+    logs = np.array([m.log_posterior for m in models])
+    w = np.exp(logs - logs.max())
+    return w / w.sum()
+
+
+__all__ = ["Candidate", "Choice", "Model", "Search", "inclusion", "posterior", "product"]

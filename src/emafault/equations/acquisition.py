@@ -1,0 +1,76 @@
+"""Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk."""
+
+import numpy as np
+
+from .dual import Dual
+from .point import Point, effect_name
+from .signals import Signals
+from .terms import with_hook
+
+LATE, EARLY = "late", "early"
+
+
+def delayed(x: np.ndarray) -> np.ndarray:
+    """Change of a signal that is one interval late: the interval before less this one."""
+    out = np.empty_like(x)
+    out[1:] = x[:-1] - x[1:]
+    out[0] = 0.0
+    return out
+
+
+def advanced(x: np.ndarray) -> np.ndarray:
+    """Change of a signal that is one interval early."""
+    out = np.empty_like(x)
+    out[:-1] = x[1:] - x[:-1]
+    out[-1] = 0.0
+    return out
+
+
+def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
+    """What is recorded of a true signal on a channel that lags (in intervals, either sign)."""
+    late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
+    out = x
+    if late.slopes or late.value:
+        out = out + late * x.linear(delayed, size)
+    if early.slopes or early.value:
+        out = out + early * x.linear(advanced, size)
+    return out
+
+
+def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:
+    """The true signal from one recorded on a channel that lags."""
+    late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
+    out = x if isinstance(x, Dual) else Dual(x)
+    plain = np.asarray(out.value)
+    if late.slopes or late.value:
+        out = out + late * advanced(plain)
+    if early.slopes or early.value:
+        out = out + early * delayed(plain)
+    return out
+
+
+def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
+    """Mean and end currents (A) of each phase from the recorded ones: lag, crosstalk, drift, then offset and gain."""
+    share = rec.time / rec.time[-1]
+    means: list[Dual] = []
+    ends: list[Dual] = []
+    at_end = rec.current_end
+    if at_end is None:
+        following = np.vstack([rec.current[1:], rec.current[-1:]])
+        at_end = 0.5 * (rec.current + following)
+    for source, out in ((rec.current, means), (at_end, ends)):
+        for j in range(3):
+            i = undone(p, "current", source[:, j], rec.size)
+            drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
+            i = i - drift * share
+            for q in range(3):
+                if q != j:
+                    i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]
+            for m in with_hook("current"):
+                i = m.current(p.of(effect_name(m)), j, i)
+            out.append(i)
+        # the true ones add up to nothing: what the three say together is less noisy than each alone
+        mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
+        for j in range(3):
+            out[j] = out[j] - mean
+    return means, ends

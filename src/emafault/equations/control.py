@@ -1,0 +1,78 @@
+"""The current that flows against the current that the controller asks for; gains and limits are the controller's own.
+
+Everything that the controller sees is recorded: command, output position, speed. Half the sum of the absolute phase
+currents is the pair's current, through commutations too. Rows are means over ``BLOCK`` and differenced, which takes the
+random walk out that the integral makes of the sensors' noise.
+"""
+
+import numpy as np
+
+from .dual import Dual, clip
+from .point import State, effect_name
+from .terms import with_hook
+
+BLOCK = 2e-3  # s
+
+
+def residual(state: State) -> Dual:
+    """Mean pair current less the demand (A), (block,), differenced."""
+    rec, a, p = state.rec, state.rec.actuator, state.p
+    h = rec.interval
+    # a demand is in force for one control period from the instant its inputs are sampled
+    lead = 0.5 * a.control_period
+    wanted = p("controller.position_gain") * (a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(rec.output, h, lead)))
+    error = clip(wanted, p("controller.speed_limit")) - _centred(rec.speed_recorded, h, lead)
+    integral = error.linear(lambda x: np.cumsum(x) * h, rec.size)
+    demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
+    demand = clip(demand, p("controller.current_limit"))
+    for m in with_hook("delay"):
+        late = m.delay(p.of(effect_name(m)))
+        rate = np.gradient(np.asarray(demand.value), h)
+        demand = demand - late * rate
+    sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
+    pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
+    width = block_length(rec)
+    return (pair - demand).linear(lambda x: _blocks(x, width), rec.size)
+
+
+def block_length(rec) -> int:
+    """Intervals in a block."""
+    return max(1, round(BLOCK / rec.interval))
+
+
+def _at_ticks(x: np.ndarray, h: float, lead: float) -> np.ndarray:
+    """Mean over each interval of a signal recorded at the intervals' ends, ``lead`` s earlier."""
+    n = np.arange(len(x)) - 0.5 - lead / h
+    return np.interp(n, np.arange(-1, len(x)), np.concatenate([[0.0], x]))
+
+
+def _centred(x: np.ndarray, h: float, lead: float) -> np.ndarray:
+    """A signal recorded as means, ``lead`` s earlier."""
+    n = np.arange(len(x)) - lead / h
+    return np.interp(n, np.arange(-1, len(x)), np.concatenate([[0.0], x]))
+
+
+def _blocks(x: np.ndarray, width: int) -> np.ndarray:
+    count = len(x) // width
+    return np.diff(x[: count * width].reshape(count, width).mean(axis=1))
+
+
+def usable(state: State) -> np.ndarray:
+    """(block,) where the rotor turns and no limit may be reached at random."""
+    rec = state.rec
+    width = block_length(rec)
+    count = rec.size // width
+    moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
+    return moving[1:] & moving[:-1]
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonals of the noise's covariance (A2)."""
+    rec, a, s = state.rec, state.rec.actuator, state.rec.noise
+    width = block_length(rec)
+    demand = a.speed_gain * np.hypot(s.speed, a.gear_ratio * a.position_gain * s.position)
+    ripple = 0.1 * a.hysteresis
+    white = (demand**2 + s.current**2 + ripple**2) / width + (0.02 * a.hysteresis) ** 2
+    walk = (a.speed_integral_gain / a.speed_gain * demand) ** 2 * rec.interval * width * rec.interval
+    count = rec.size // width - 1
+    return [np.full(count, 2.0 * white + walk), np.full(count - 1, -white)]

@@ -1,0 +1,62 @@
+"""v_j = R_j i_j + d(flux)/dt + e_j of each phase, means over the interval: exact for any motion within it.
+
+The mean of e_j is k_j times the integral of f over the angle swept, the mean of the flux term the difference of the flux
+between the interval's ends.
+"""
+
+import numpy as np
+
+from .acquisition import recorded_late
+from .dual import Dual, value_of
+from .point import State, effect_name
+from .terms import with_hook
+
+NAMES = ("electrical_a", "electrical_b", "electrical_c")
+
+
+def voltages(state: State) -> list[Dual]:
+    """Mean true voltage of each phase, terminal to star point (V)."""
+    rec, a = state.rec, state.rec.actuator
+    out = []
+    for j in range(3):
+        flux = state.current_end[j]
+        for m in with_hook("flux"):
+            flux = m.flux(state.p.of(effect_name(m)), flux)
+        L: Dual | float = a.inductance
+        for m in with_hook("inductance"):
+            L = L * m.inductance(state.p.of(effect_name(m)), rec, j)
+        L = L * state.turns[j] * state.turns[j]
+        rise = flux.linear(_difference, rec.size) * (1.0 / rec.interval)
+        out.append(state.resistance[j] * state.current[j] + L * rise + state.k[j] * state.swept[j])
+    return out
+
+
+def _difference(x: np.ndarray) -> np.ndarray:
+    return np.diff(x, prepend=0.0)
+
+
+def residuals(state: State) -> dict[str, Dual]:
+    """Recorded less predicted voltage (V) of each phase."""
+    rec, p = state.rec, state.p
+    true = [recorded_late(p, "voltage", v, rec.size) for v in voltages(state)]
+    modules = sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False))
+    for m in modules:
+        true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
+    share = rec.time / rec.time[-1]
+    out = {}
+    for j, name in enumerate(NAMES):
+        drift = p(f"drift_voltage.{'abc'[j]}@{rec.name}")
+        out[name] = rec.voltage[:, j] - true[j] - drift * share
+    return out
+
+
+def noise_bands(state: State, j: int) -> list[np.ndarray]:
+    """Diagonals of the noise's covariance (V2): white, and that of differenced end currents and angles."""
+    rec, a, s = state.rec, state.rec.actuator, state.rec.noise
+    white = s.voltage**2 + (a.resistance * s.current) ** 2
+    end = s.current_end if rec.current_end is not None else a.hysteresis / np.sqrt(3.0)
+    f = np.asarray(value_of(state.conducting[j]))
+    angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
+    differenced = (a.inductance / rec.interval * end) ** 2 + angle
+    before = np.concatenate([differenced[:1], differenced[:-1]])
+    return [white + differenced + before, -differenced[:-1]]

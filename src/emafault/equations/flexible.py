@@ -1,0 +1,41 @@
+"""The user shaft behind a stiffness, driven through its play by a given motion of the gear."""
+
+import numpy as np
+
+from ..actuator.compiled import compiled
+
+LONGEST = 5e-5  # s, of a step of the integration
+
+
+@compiled
+def flexible_shaft(gear, interval, K, C, J, ground, play):
+    """Angle of the user shaft (rad) and torque that it takes from the gear (N m, mean over each interval).
+
+    ``gear`` (sample,) angle of the gear (rad) at the ends of the intervals, at rest before the first; ``K`` (N m/rad),
+    ``C`` and ``ground`` (N m s/rad), ``J`` (kg m2), ``play`` (rad, total). The damping may pull, in contact only.
+    """
+    n = gear.shape[0]
+    position, torque = np.empty(n), np.empty(n)
+    steps = int(np.ceil(interval / LONGEST))
+    h = interval / steps
+    x, v, start = 0.0, 0.0, gear[0]
+    for m in range(n):
+        rate = (gear[m] - start) / interval
+        total = 0.0
+        for k in range(steps):
+            g = start + (k + 0.5) * h * rate
+            gap = g - x
+            side = 1.0 if gap > 0.5 * play else (-1.0 if gap < -0.5 * play else 0.0)
+            if side == 0.0:
+                v -= h * ground * v / J
+                push = 0.0
+            else:
+                # implicit in the speed: C/J is fast against the step where both are large
+                twist = gap - 0.5 * side * play
+                v = (v + h * (K * (twist - 0.5 * h * v) + C * rate) / J) / (1.0 + h * (C + ground) / J)
+                push = K * twist + C * (rate - v)
+            x += h * v
+            total += push
+        start = gear[m]
+        position[m], torque[m] = x, total / steps
+    return position, torque

@@ -1,0 +1,278 @@
+"""The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.model import Block, Parameter, Unit, Variant
+from ..effects import EFFECTS, Effect
+from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
+from .point import Point, State
+from .signals import Signals
+from .terms import TERMS
+
+FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
+HEALTHY = 1e-3
+EDGE_SCATTER = 3e-4  # electrical rad, by which the model of how current passes over may be wrong in a recording
+SOAK = 0.5  # K, of the measured ambient temperature
+GAIN_PRIOR = 0.3  # relative, of the controller's gains
+SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
+PER_PHASE = ("a", "b", "c")
+
+
+class ReferenceActuator:
+    """Recordings of one unit of the reference actuator as the diagnosis sees them."""
+
+    name = "actuator"
+
+    def __init__(self, actuator: ActuatorParameters, recordings: Mapping[str, Signals], exclude: Sequence[str] = ()):
+        self.actuator = actuator
+        self.recordings = dict(recordings)
+        self._disturbed: dict[str, Signals] = {}
+        self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
+        self.parameters = self._nuisances()
+        self.units = [self._unit(e) for e in self.effects.values() if e.id != "speed_quantisation"]
+        self.units += self._forms()
+        for unit in self.units:
+            for p in unit.parameters:
+                self.parameters.setdefault(p.name, p)
+        for effect in EFFECTS.values():  # one left out of the library is off
+            for name, p in _internal(effect).items():
+                full = f"{effect.id}.{name}"
+                if full not in self.parameters and effect.id not in self.effects:
+                    self.parameters[full] = Parameter(full, p.off, p.off, 0.0, p.units, fixed=True)
+
+    # ---- parameters
+    def _nuisances(self) -> dict[str, Parameter]:
+        a = self.actuator
+        out: dict[str, Parameter] = {}
+        for effect in EFFECTS.values():
+            for name, p in effect.parameters.items():
+                if p.tolerance > 0.0:
+                    centre = getattr(a, p.follows) if p.follows else p.nominal
+                    full = f"{effect.id}.{name}"
+                    out[full] = Parameter(full, centre, centre, p.tolerance * abs(centre), p.units)
+        for name in ("position_gain", "speed_gain", "speed_integral_gain"):
+            at = getattr(a, name)
+            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
+        for name in ("current_limit", "speed_limit"):
+            at = getattr(a, name)
+            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
+        full = "controller.commutation_time"
+        out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
+        full = "controller.commutation_slope"
+        out[full] = Parameter(full, 4e-6, 4e-6, 1e-5, "s/A")
+        for name, sd, units in (("speed", 1e-5, "s"), ("power", 1e-5, "s/A"), *((f"time_{j}", 1e-6, "s") for j in "abc")):
+            full = f"controller.commutation_{name}"
+            out[full] = Parameter(full, 0.0, 0.0, sd, units)
+        unknown = False
+        for name, rec in self.recordings.items():
+            out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
+            for j in PER_PHASE:
+                full = f"controller.edge_{j}@{name}"
+                out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
+            if rec.health == "seeded":
+                for f in FAULTS:
+                    out[f"{f}@{name}"] = _fault(f"{f}@{name}", f)
+            elif rec.health == "healthy":
+                for f in FAULTS:
+                    out[f"{f}@{name}"] = Parameter(f"{f}@{name}", 0.0, 0.0, 0.5 * HEALTHY, "1")
+            else:
+                unknown = True
+        if unknown:
+            for f in FAULTS:
+                out[f] = _fault(f, f)
+        return out
+
+    def _unit(self, effect: Effect) -> Unit:
+        module = TERMS[effect.id]
+        parameters, positive = [], []
+        if effect.kind == "calibration":
+            for name, p in effect.parameters.items():
+                full = f"{effect.id}.{name}"
+                base = self.parameters[full]
+                width = _width(p.nominal, p.low, p.high) * (base.off / p.nominal)
+                parameters.append(Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full))
+            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters)])
+        internal = _internal(effect)
+        for name, q in internal.items():
+            full = f"{effect.id}.{name}"
+            parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units))
+            positive.append(_sign(effect, name))
+        shapes = getattr(module, "SHAPES", ())
+        variants = [Variant(parameters, positive)] if not shapes else []
+        for n, shape in enumerate(shapes):
+            full = f"{effect.id}#{n}"
+            near = n > 0 and effect.id != "stribeck" or effect.id == "compliance"
+            mean, sd = (1.0, 0.5) if near else (0.0, 2.0)
+            parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
+            variants.append(Variant([parameter], [0 if near else 1]))
+        return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive))
+
+    def _forms(self) -> list[Unit]:
+        out = []
+        for channel in ("voltage", "current", "speed", "output"):
+            variants = [
+                Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1]) for side in ("late", "early")
+            ]
+            out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants))
+        pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
+        parameters = [Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1") for j, q in pairs]
+        out.append(Unit("~crosstalk_current", "form", ("sensor_current",), [Variant(parameters)]))
+        for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
+            for j in PER_PHASE:
+                parameters = [
+                    Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings
+                ]
+                out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)]))
+        return out
+
+    # ---- equations
+    def blocks(self, values: Mapping[str, float], name: str, disturbed: bool = False) -> list[Block]:
+        """Residuals of every equation of a recording, with columns by every parameter.
+
+        ``disturbed`` takes the recording with one more draw of the sensors' noise.
+        """
+        rec = self.recordings[name]
+        if disturbed:
+            if name not in self._disturbed:
+                self._disturbed[name] = rec.disturbed(1)
+            rec = self._disturbed[name]
+        return self._recording(values, rec)
+
+    def _recording(self, values: Mapping[str, float], rec: Signals) -> list[Block]:
+        point = Point(values, rec.name)
+        state = State(rec, point)
+        found = []
+        for j, (name, r) in enumerate(electrical.residuals(state).items()):
+            found.append((name, r, electrical.noise_bands(state, j), _not_first(rec)))
+        found.append(("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec)))
+        found.append(("sensor_speed", sensor_speed.residual(state), sensor_speed.noise_bands(state), _not_first(rec)))
+        found.append(("torque", torque.residual(state), torque.noise_bands(state), torque.usable(state)))
+        found.append(("position", position.residual(state), position.noise_bands(state), _not_first(rec)))
+        if rec.bus is not None:
+            found.append(("bus", bus.residual(state), bus.noise_bands(state), _not_first(rec)))
+        found.append(("control", control.residual(state), control.noise_bands(state), control.usable(state)))
+        turning = commutation.residual(state)
+        count = len(turning.value)
+        if count > 20:
+            found.append(("commutation", turning, commutation.noise_bands(state, count), np.ones(count, bool)))
+        blocks = []
+        for name, r, bands, usable in found:
+            columns = dict(r.slopes)
+            for parameter, column in self._secants(state, name, r, values).items():
+                columns[parameter] = column
+            blocks.append(Block(rec.name, name, np.asarray(r.value), columns, bands, usable, self._coordinates(state, name)))
+        return blocks
+
+    def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """Columns of effects that have no derivative at "off": the residual with them less that without."""
+        out = {}
+        reach = {"sensor_speed": sensor_speed, "torque": torque, "position": position}
+        if equation not in reach:
+            return out
+        for unit in self.units:
+            for variant in unit.variants:
+                for p in variant.parameters:
+                    if p.secant is None or not _acts(unit, equation):
+                        continue
+                    if any(values[n] != self.parameters[n].off for n in p.secant):
+                        continue  # at a point where the effect is on, its own derivatives serve
+                    kept = state.p
+                    state.p = Point({**values, **p.secant}, state.rec.name)
+                    out[p.name] = np.asarray(reach[equation].residual(state).value) - np.asarray(r.value)
+                    state.p = kept
+        return out
+
+    def _coordinates(self, state: State, equation: str) -> dict[str, np.ndarray]:
+        """What the rows of an equation lie along, and the drivers that a coefficient would multiply; (row,) each."""
+        rec = state.rec
+        w = rec.speed / 100.0
+        level = np.abs(rec.current).sum(axis=1) / 4.0
+        t = rec.time / rec.time[-1] - 0.5
+        x = rec.actuator.pole_pairs * rec.middle
+        base = {
+            "direction": rec.direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
+            "rotor_angle": np.mod(rec.middle, 2 * np.pi), "temperature": np.full(rec.size, rec.ambient),
+        }  # fmt: skip
+        phi = [
+            np.ones(rec.size), rec.direction, np.abs(w), w * w, level - 0.3, t, np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
+            np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle), np.full(rec.size, rec.dT_measured / 50.0),
+            np.exp(-np.abs(rec.speed) / 8.0), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
+        ]  # fmt: skip
+        drivers = [np.ones(rec.size)]
+        if equation.startswith("electrical"):
+            j = "abc".index(equation[-1])
+            drivers += [rec.current[:, j], np.asarray(state.swept[j].value) * 0.02]
+        elif equation == "torque":
+            drivers += [rec.direction]
+        elif equation == "sensor_speed":
+            drivers += [w]
+        elif equation == "sensor_current":
+            balanced = rec.current - rec.current.mean(axis=1, keepdims=True)
+            drivers += [balanced[:, j] for j in range(2)]
+        elif equation == "bus":
+            drivers += [state.bus_current]
+        elif equation == "position":
+            drivers += [rec.direction, rec.acceleration / 1e3]
+        rows: np.ndarray | slice = slice(None)
+        if equation == "control":
+            width = control.block_length(rec)
+            count = rec.size // width - 1
+            rows = (np.arange(count) + 1) * width
+        elif equation == "commutation":
+            rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
+        return {
+            **{k: v[rows] for k, v in base.items()},
+            "phi": np.array([f[rows] for f in phi]),
+            "drivers": np.array([d[rows] for d in drivers]),
+            "slow": SLOW_FUNCTIONS,
+        }
+
+
+def _acts(unit: Unit, equation: str) -> bool:
+    return equation in unit.equations or (unit.id == "compliance" and equation == "torque")
+
+
+def _not_first(rec: Signals) -> np.ndarray:
+    out = np.ones(rec.size, bool)
+    out[0] = out[-1] = False
+    return out
+
+
+def _fault(full: str, component: str) -> Parameter:
+    turns = component.startswith("N")
+    return Parameter(full, 0.0, 0.03 if turns else 0.0, 0.05 if turns else 0.1, "1")
+
+
+def _width(nominal: float, low: float, high: float) -> float:
+    return 0.6 * max(abs(high - nominal), abs(low - nominal))
+
+
+class _Internal:
+    def __init__(self, off: float, mean: float, sd: float, units: str):
+        self.off, self.mean, self.sd, self.units = off, mean, sd, units
+
+
+def _internal(effect: Effect) -> dict[str, _Internal]:
+    """Parameters that an effect is fitted in, with their priors."""
+    own = getattr(TERMS[effect.id], "PARAMETERS", None)
+    if own is not None:
+        return {n: _Internal(off, mean, sd, "") for n, (off, mean, sd) in own.items()}
+    return {
+        n: _Internal(p.nominal, p.nominal, _width(p.nominal, p.low, p.high), p.units)
+        for n, p in effect.parameters.items()
+    }
+
+
+def _sign(effect: Effect, name: str) -> int:
+    """+1 or -1 where a parameter's range lies on one side of off."""
+    p = effect.parameters.get(name)
+    if p is None:
+        return 1 if name in ("heating_rate", "flexibility") else 0
+    if p.low >= p.nominal and p.high > p.nominal:
+        return 1
+    if p.high <= p.nominal and p.low < p.nominal:
+        return -1
+    return 0

@@ -1,0 +1,42 @@
+"""theta_u against theta/ratio through the play, which is integrated along the measured angle."""
+
+import numpy as np
+
+from ..actuator.compiled import compiled
+from .acquisition import recorded_late
+from .dual import Dual, value_of
+from .point import State, effect_name
+from .terms import with_hook
+
+
+@compiled
+def through_play(gear, half):
+    """Angle of the shaft behind a play of half-width ``half`` (rad), and its derivative by ``half``; from its middle."""
+    out, slope = np.empty(gear.shape[0]), np.empty(gear.shape[0])
+    at, by = 0.0, 0.0
+    for n in range(gear.shape[0]):
+        if gear[n] - half > at:
+            at, by = gear[n] - half, -1.0
+        elif gear[n] + half < at:
+            at, by = gear[n] + half, 1.0
+        out[n], slope[n] = at, by
+    return out, slope
+
+
+def residual(state: State) -> Dual:
+    """Recorded less predicted angle of the user shaft (rad)."""
+    rec = state.rec
+    play: Dual | float = 0.0
+    for m in with_hook("play"):
+        play = play + m.play(state.p.of(effect_name(m)))
+    value, slope = through_play(rec.turned / rec.actuator.gear_ratio, 0.5 * float(value_of(play)))
+    shaft = play.through(value, 0.5 * slope)
+    for m in with_hook("twist"):
+        shaft = m.twist(state.p.of(effect_name(m)), rec, shaft, float(value_of(play)))
+    return rec.output - recorded_late(state.p, "output", shaft, rec.size)
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonal of the noise's covariance (rad2)."""
+    rec = state.rec
+    return [np.full(rec.size, rec.noise.position**2 + (rec.noise.angle / rec.actuator.gear_ratio) ** 2)]

@@ -1,0 +1,113 @@
+"""Quantities of one recording at a point that several equations need: true currents, coefficients, the shape."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from .acquisition import true_currents
+from .dual import Dual, value_of
+from .point import State, effect_name
+from .shape import trapezoid_at, trapezoid_swept
+from .terms import with_hook
+
+PLATEAU = np.pi / 6.0  # electrical rad, where the commutation switches a phase on
+
+
+def fill(state: State) -> None:
+    """Compute them, in the order in which they depend on one another."""
+    rec, p = state.rec, state.p
+    state.dT = p.own("dT") + rec.dT_measured
+    rec.dT = state.dT  # the terms of the effects see the recording
+    state.current, state.current_end = true_currents(rec, p)
+    _angles(state)
+    _coefficients(state)
+    _resistances(state)
+
+
+def _product(state: State, hook: str, *args):
+    total: Dual | float = 1.0
+    for m in with_hook(hook):
+        total = total * getattr(m, hook)(state.p.of(effect_name(m)), *args)
+    return total
+
+
+def _sum(state: State, hook: str, *args):
+    total: Dual | float = 0.0
+    for m in with_hook(hook):
+        total = total + getattr(m, hook)(state.p.of(effect_name(m)), *args)
+    return total
+
+
+def _angles(state: State) -> None:
+    """Mean of f over each interval, swept and over its conducting part; both with derivatives by offset and ramp."""
+    rec = state.rec
+    shift, ramp = _sum(state, "angle"), _sum(state, "ramp")
+    poles = rec.actuator.pole_pairs
+    state.swept, state.conducting, state.at_middle = [], [], []
+    for j in range(3):
+        low, high = poles * rec.before - rec.axis[j], poles * rec.angle - rec.axis[j]
+        state.swept.append(_mean_shape(state, low, high, shift, ramp) * (1.0 / (poles * rec.interval)))
+        state.conducting.append(_conducting_shape(state, np.minimum(low, high), np.maximum(low, high), shift, ramp))
+
+
+def _mean_shape(state: State, low, high, shift, ramp) -> Dual:
+    """Integral of f from low to high (electrical rad), measured angles."""
+    off, r = value_of(shift), value_of(ramp)
+    F1, dr1 = trapezoid_swept(low - off, r)
+    F2, dr2 = trapezoid_swept(high - off, r)
+    f1, f2 = trapezoid_at(low - off, r)[0], trapezoid_at(high - off, r)[0]
+    total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
+    for m in with_hook("harmonics"):
+        h = m.harmonics
+        swept_2 = h(state.p.of(effect_name(m)), high - off)[1]
+        swept_1 = h(state.p.of(effect_name(m)), low - off)[1]
+        total = total + (swept_2 - swept_1)
+    return total
+
+
+def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:
+    """Mean of f over the part of each interval in which its phase is switched on.
+
+    The mean of f i is the mean current times this, even where the current sets in within the interval.
+    """
+    centre = 0.5 * (low + high)
+    half_turn = np.pi * np.floor(centre / np.pi)
+    a = np.clip(low, half_turn + PLATEAU, half_turn + np.pi - PLATEAU)
+    b = np.clip(high, half_turn + PLATEAU, half_turn + np.pi - PLATEAU)
+    narrow = b - a < 1e-5
+    b = np.where(narrow, a + 1e-5, b)
+    return _mean_shape(state, a, b, shift, ramp) * (1.0 / (b - a))
+
+
+def _coefficients(state: State) -> None:
+    rec, p = state.rec, state.p
+    a = rec.actuator
+    state.k, state.turns = [], []
+    for j in range(3):
+        N = p.own("N" + "abc"[j])
+        g = 1.0 + p.own("xi_x") * np.cos(rec.axis[j]) + p.own("xi_y") * np.sin(rec.axis[j])
+        state.turns.append(1.0 - N)
+        state.k.append(_product(state, "coefficient", rec, j) * (1.0 - N) * g * a.back_emf)
+
+
+def _resistances(state: State) -> None:
+    rec, p, a = state.rec, state.p, state.rec.actuator
+    base = [_product(state, "winding", rec, j) * state.turns[j] * a.resistance for j in range(3)]
+    alpha = a.copper_coefficient
+    ripple = a.hysteresis**2 / 3.0
+    loss = 0.0
+    warm = 1.0 + alpha * rec.dT_measured
+    for j in range(3):
+        i = np.asarray(value_of(state.current[j]))
+        on = np.abs(i) > 0.5 * a.hysteresis
+        loss = loss + value_of(base[j]) * warm * (i * i + on * ripple)
+    heat = 0.0
+    for m in with_hook("heating"):
+        heat = heat + m.heating(p.of(effect_name(m)), rec, loss)
+    state.resistance = [
+        base[j] * (1.0 + alpha * (state.dT + heat)) + _sum(state, "resistance", rec, j) for j in range(3)
+    ]
+    state.loss = loss
+    # filters run along time, so the mean over the last millisecond stands for the bus current
+    drive = sum((value_of(state.k[j]) * value_of(state.swept[j]) * value_of(state.current[j]) for j in range(3)), 0.0)
+    state.bus_current = (loss + drive) / a.bus_voltage
+    state.lfilter = lfilter

@@ -1,0 +1,41 @@
+"""The three currents add up to nothing, and a recorded sum shows gains, offsets and crosstalk of the sensors."""
+
+import numpy as np
+
+from .acquisition import recorded_late
+from .dual import Dual, value_of
+from .point import State, effect_name
+from .terms import with_hook
+
+
+def residual(state: State) -> Dual:
+    """Recorded sum (A) less what gains, offsets, drift, crosstalk and lag make of currents that add up to nothing.
+
+    The true currents are taken as the recorded ones less their mean: the noise of these is independent of that of the
+    sum, so that no term can explain the noise. The recorded sum keeps coefficient one.
+    """
+    rec, p = state.rec, state.p
+    true = np.array([np.asarray(value_of(i)) for i in state.current])
+    share = rec.time / rec.time[-1]
+    out = Dual(rec.current.sum(axis=1))
+    for j, phase in enumerate("abc"):
+        seen = recorded_late(p, "current", Dual(true[j]), rec.size)
+        for m in reversed(with_hook("current")):
+            seen = _recorded(m, p.of(effect_name(m)), j, seen)
+        seen = seen + p(f"drift_current.{phase}@{rec.name}") * share
+        for q, other in enumerate("abc"):
+            if q != j:
+                seen = seen + p(f"crosstalk.{phase}{other}") * true[q]
+        out = out - seen
+    return out
+
+
+def _recorded(module, p, j: int, true: Dual) -> Dual:
+    """Inverse of an effect's affine map from the recorded to the true current."""
+    at_0, at_1 = module.current(p, j, Dual(0.0)), module.current(p, j, Dual(1.0))
+    return (true - at_0) / (at_1 - at_0)
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonal of the noise's covariance (A2)."""
+    return [np.full(state.rec.size, 3.0 * state.rec.noise.current**2)]

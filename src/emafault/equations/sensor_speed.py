@@ -1,0 +1,32 @@
+"""The recorded speed against the rate of the recorded angle."""
+
+import numpy as np
+
+from .acquisition import recorded_late
+from .dual import Dual
+from .point import State, effect_name
+from .terms import with_hook
+
+
+def residual(state: State) -> Dual:
+    """Recorded less predicted speed (rad/s).
+
+    The rate of the angle keeps coefficient one; what effects make of the speed is taken of the smoothed one, whose
+    noise is nearly independent of the residual's.
+    """
+    rec = state.rec
+    change = _seen(state, Dual(rec.speed)) - rec.speed
+    return rec.speed_recorded - rec.rate - change
+
+
+def _seen(state: State, w: Dual) -> Dual:
+    for m in with_hook("speed"):
+        w = m.speed(state.p.of(effect_name(m)), state.rec, w)
+    return recorded_late(state.p, "speed", w, state.rec.size)
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonals of the noise's covariance ((rad/s)2)."""
+    rec = state.rec
+    angle = (rec.noise.angle / rec.interval) ** 2
+    return [np.full(rec.size, rec.noise.speed**2 + 2.0 * angle), np.full(rec.size - 1, -angle)]

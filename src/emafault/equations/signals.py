@@ -1,0 +1,117 @@
+"""One recording as the equations take it: angles at both ends of each interval, speed, direction, what is masked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from ..actuator.motor import AXIS
+from ..actuator.parameters import ActuatorParameters
+from ..actuator.sensors import SensorNoise
+from ..recording import Recording
+
+SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
+SLOW = 2.0  # rad/s, below which dry friction has no known sign
+REST = 2e-3  # rad of the rotor, within which it has not moved yet
+
+
+@dataclass
+class Signals:
+    """Arrays over the intervals (sample,) of one recording; phases trail."""
+
+    name: str
+    actuator: ActuatorParameters
+    interval: float
+    voltage: np.ndarray  # (sample, phase)
+    current: np.ndarray  # (sample, phase)
+    current_end: np.ndarray | None
+    speed_recorded: np.ndarray
+    angle: np.ndarray
+    output: np.ndarray
+    command: np.ndarray
+    bus: np.ndarray | None
+    ambient: float
+    health: str
+    noise: SensorNoise
+    masked: dict[str, np.ndarray] = field(default_factory=dict)  # channel -> (sample,) not to be used
+
+    @classmethod
+    def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
+        r = recording
+        return cls(
+            name, actuator, r.interval, r.phase_voltage, r.phase_current, r.phase_current_end, r.rotor_speed,
+            r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health, noise,
+        )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        theta, h = self.angle, self.interval
+        self.size = len(theta)
+        self.axis = AXIS
+        self.time = (np.arange(self.size) + 0.5) * h
+        self.before = np.concatenate([theta[:1], theta[:-1]])
+        self.middle = 0.5 * (theta + self.before)
+        self.half_sweep = 0.5 * (theta - self.before)
+        self.rate = (theta - self.before) / h
+        span = max(1, round(SPEED_SPAN / h))
+        self.speed = uniform_filter1d(self.rate, span, mode="nearest")
+        self.direction = np.sign(self.speed)
+        moving = np.abs(self.speed) > SLOW
+        # dry friction is known where the rotor moves throughout
+        self.moving = moving & np.roll(moving, 1) & np.roll(moving, -1)
+        self.moving[0] = False
+        self.start = self._start_angle()
+        self.turned = theta - self.start
+        self.shaft = 0.5 * (theta + self.before - 2.0 * self.start) / self.actuator.gear_ratio
+        slow = uniform_filter1d(self.rate, max(3, round(3e-3 / h)), mode="nearest")
+        self.acceleration = np.gradient(slow, h)
+        self.rows_from = self
+        self.nominal_play = self.actuator.backlash
+        self.dT_measured = self.ambient - self.actuator.reference_temperature
+
+    def _start_angle(self) -> float:
+        moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)
+        still = int(moved[0]) if len(moved) else self.size
+        return float(np.mean(self.angle[: max(1, still - 1)]))
+
+    def disturbed(self, seed: int) -> "Signals":
+        """A copy with a draw of the sensors' noise added once more; what is masked and along what rows lie stays."""
+        rng = np.random.default_rng(seed)
+
+        def more(x: np.ndarray, sigma: float) -> np.ndarray:
+            return x + sigma * rng.standard_normal(x.shape)
+
+        s = self.noise
+        end = None if self.current_end is None else more(self.current_end, s.current_end)
+        bus = None if self.bus is None else more(self.bus, s.bus_voltage)
+        out = Signals(
+            self.name, self.actuator, self.interval, more(self.voltage, s.voltage), more(self.current, s.current), end,
+            more(self.speed_recorded, s.speed), more(self.angle, s.angle), more(self.output, s.position), self.command,
+            bus, self.ambient, self.health, s,
+        )  # fmt: skip
+        out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
+        return out
+
+
+def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> SensorNoise:
+    """Noise of the channels that regressors are made of, from differences in which the motion hardly shows.
+
+    The smallest over the recordings counts: motion between samples can only add to a difference.
+    """
+    def robust(x: np.ndarray) -> float:
+        return float(np.median(np.abs(x - np.median(x))) / 0.6745) if len(x) else np.inf
+
+    angle = min(robust(np.diff(r.rotor_angle, 3)) / np.sqrt(20.0) for r in recordings)
+    current = min(robust(np.diff(r.phase_current.sum(axis=1), 2)) / np.sqrt(18.0) for r in recordings)
+    end = np.inf
+    for r in recordings:
+        if r.phase_current_end is None:
+            continue
+        for j in range(3):
+            off = np.abs(r.phase_current[:, j]) < 5.0 * max(current, 1e-6)
+            still = off & np.roll(off, 1) & np.roll(off, -1)
+            end = min(end, robust(r.phase_current_end[still, j])) if still.sum() > 50 else end
+    limits = {"angle": angle, "current": current, "current_end": end}
+    return replace(
+        nominal, **{k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k))) for k, v in limits.items() if np.isfinite(v)}
+    )

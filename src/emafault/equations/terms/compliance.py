@@ -1,0 +1,58 @@
+"""The user shaft has an inertia of its own behind a stiffness; its motion is integrated along the measured angle."""
+
+import numpy as np
+
+from ..flexible import flexible_shaft
+
+SENTENCE = "the transmission is flexible"
+PARAMETERS = {"flexibility": (0.0, 1.5e-4, 1.2e-4), "C": (300.0, 300.0, 60.0)}
+SHAPES = ({"flexibility": 6e-5, "C": 300.0}, {"flexibility": 1.3e-4, "C": 300.0}, {"flexibility": 3e-4, "C": 300.0})
+SECANT_FROM_OFF = True
+GROUND = 2.0  # N m s/rad from the user shaft to ground
+SHARE = 0.3  # of the inertia behind the stiffness
+STIFFEST = 2e-5  # rad/(N m)
+
+
+def solve(rec, flexibility, damping, play):
+    """User angle (rad) and torque on the motor less that of a rigid shaft (N m) along the measured rotor angle."""
+    a = rec.actuator
+    if flexibility < STIFFEST:
+        return None
+    J = SHARE * a.inertia * a.gear_ratio**2
+    position, torque = flexible_shaft(rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play)
+    return position, torque / a.gear_ratio - SHARE * a.inertia * rec.acceleration
+
+
+def twist(p, rec, rigid, play):
+    """User angle (rad) that replaces the rigid one."""
+    return _dual(p, rec, 0, rigid, play)
+
+
+def torque(p, rec):
+    """Torque on the motor beyond the rigid shaft's inertia (N m)."""
+    return _dual(p, rec, 1, None, rec.nominal_play)
+
+
+def _dual(p, rec, which, rigid, play):
+    flexibility, damping = p("flexibility"), p("C")
+    base = solve(rec, flexibility.value, damping.value, play)
+    if base is None:
+        return rigid if rigid is not None else flexibility.through(0.0, 0.0)
+    slopes = []
+    for f, c, step in ((1e-6, 0.0, 1e-6), (0.0, 5.0, 5.0)):
+        there = solve(rec, flexibility.value + f, damping.value + c, play)
+        slopes.append((there[which] - base[which]) / step)
+    value = np.asarray(base[which])
+    return flexibility.through(value, slopes[0]) + damping.through(0.0, slopes[1])
+
+
+def report(value, deviation):
+    """Catalogue parameters from the fitted ones: name -> (value, standard deviation)."""
+    K = 1.0 / max(value["flexibility"], 1e-6)
+    return {"K": (K, deviation["flexibility"] * K * K), "C": (value["C"], deviation["C"])}
+
+
+def catalogue(value):
+    """Catalogue parameters for the simulator."""
+    on = value["flexibility"] > STIFFEST
+    return {"K": 1.0 / value["flexibility"] if on else 0.0, "C": value["C"]}

@@ -1,0 +1,8 @@
+"""The current reference takes effect later."""
+
+SENTENCE = "the current reference takes effect late"
+
+
+def delay(p):
+    """Delay (s)."""
+    return p("delay")

@@ -1,0 +1,21 @@
+"""The incremental inductance falls with current, L / (1 + s i^2)."""
+
+import numpy as np
+
+SENTENCE = "the inductance saturates"
+SERIES = 1e-4  # of s i^2, below which the series is exact to rounding
+
+
+def flux(p, i):
+    """Integral of di / (1 + s i^2) (A), from 0 to i: atan(sqrt(s) i) / sqrt(s)."""
+    s = p("s")
+    x = np.asarray(i.value)
+    q = s.value * x * x
+    if s.value <= 0.0 or np.max(q) < SERIES:
+        value = x * (1.0 - q / 3.0 + q * q / 5.0)
+        by_s = x**3 * (-1.0 / 3.0 + 2.0 * q / 5.0)
+    else:
+        root = np.sqrt(s.value)
+        value = np.arctan(root * x) / root
+        by_s = np.where(q < SERIES, -(x**3) / 3.0, (x / (1.0 + q) - value) / (2.0 * s.value))
+    return i.through(value, 1.0 / (1.0 + q)) + s.through(0.0, by_s)

@@ -1,0 +1,27 @@
+"""The measured speed is first-order filtered."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+SENTENCE = "the speed sensor lags"
+SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
+SHORTEST = 1e-6  # s
+
+
+def filtered(w, interval, tau):
+    """Means over the intervals of a first-order filter's output, its input constant within each."""
+    if tau < SHORTEST:
+        return w
+    decay = np.exp(-interval / tau)
+    state = lfilter([1.0 - decay], [1.0, -decay], w)
+    before = np.concatenate([[0.0], state[:-1]])
+    return w + (before - w) * (tau / interval) * (1.0 - decay)
+
+
+def speed(p, rec, w):
+    """Recorded speed (rad/s) from the true one."""
+    tau = p("tau")
+    at, h = max(tau.value, 0.0), rec.interval
+    step = 1e-5
+    slope = (filtered(w.value, h, at + step) - filtered(w.value, h, at)) / step
+    return w.linear(lambda x: filtered(x, h, at), rec.size) + tau.through(0.0, slope)

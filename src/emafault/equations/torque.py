@@ -1,0 +1,68 @@
+"""J dw/dt = T_e - B w - T_load - T_F, in the second difference of the recorded angle.
+
+Both sides are averaged over the triangle of two intervals that the second difference weighs an acceleration with.
+Samples around rest are left out: dry friction has no known sign there.
+"""
+
+import numpy as np
+
+from .dual import Dual
+from .point import State, effect_name
+from .terms import with_hook
+
+
+def net_torque(state: State) -> Dual:
+    """Mean torque on the rotor in each interval (N m)."""
+    rec, a = state.rec, state.rec.actuator
+    drive = [state.k[j] * state.conducting[j] * state.current[j] for j in range(3)]
+    level: Dual | float = a.coulomb_friction
+    for m in with_hook("friction"):
+        level = level * m.friction(state.p.of(effect_name(m)), rec)
+    viscous: Dual | float = a.viscous_friction
+    for m in with_hook("viscous"):
+        viscous = viscous * m.viscous(state.p.of(effect_name(m)))
+    net = drive[0] + drive[1] + drive[2] - viscous * rec.speed - level * rec.direction
+    for m in with_hook("torque"):
+        net = net - m.torque(state.p.of(effect_name(m)), rec)
+    return net
+
+
+def residual(state: State) -> Dual:
+    """J0 times the measured acceleration less that of the model (N m)."""
+    rec, a = state.rec, state.rec.actuator
+    inertia: Dual | float = 1.0
+    for m in with_hook("inertia"):
+        inertia = inertia * m.inertia(state.p.of(effect_name(m)))
+    balance = net_torque(state) / inertia
+    theta = rec.angle
+    second = np.zeros(rec.size)
+    second[1:-1] = (theta[2:] - 2.0 * theta[1:-1] + theta[:-2]) / rec.interval**2
+    return a.inertia * second - balance.linear(_two_intervals, rec.size)
+
+
+def _two_intervals(x: np.ndarray) -> np.ndarray:
+    """Mean over an interval and the next, at the angle sample between them."""
+    out = np.array(x, copy=True)
+    out[:-1] = 0.5 * (x[:-1] + x[1:])
+    return out
+
+
+def usable(state: State) -> np.ndarray:
+    """(sample,) where the rotor moves throughout."""
+    moving = state.rec.moving
+    out = moving & np.roll(moving, -1)
+    out[:2] = out[-2:] = False
+    return out
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonals of the noise's covariance ((N m)2)."""
+    rec, a, s = state.rec, state.rec.actuator, state.rec.noise
+    angle = (a.inertia * s.angle / rec.interval**2) ** 2
+    current = 2.0 * (a.back_emf * s.current) ** 2
+    n = rec.size
+    return [
+        np.full(n, 6.0 * angle + 0.5 * current),
+        np.full(n - 1, -4.0 * angle + 0.25 * current),
+        np.full(n - 2, angle),
+    ]
