@@ -41,7 +41,7 @@ class Bench:
     threads : recordings are linearised side by side
     """
 
-    def __init__(self, machine, recordings: Sequence[str], threads: int = 2):
+    def __init__(self, machine, recordings: Sequence[str], threads: int = 1):
         self.machine, self.recordings, self.threads = machine, list(recordings), threads
         self.parameters: dict[str, Parameter] = dict(machine.parameters)
         self.units: list[Unit] = list(machine.units)
@@ -160,7 +160,7 @@ class Bench:
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
                 out[unit.id, v] = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
-                    (1.0,) if switch else WIDTHS, names,
+                    (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
                 )  # fmt: skip
         equations = dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder."))
         for equation in equations:
@@ -219,6 +219,8 @@ class Bench:
                     largest = 1.0
                 else:
                     largest = max(largest, abs(d) / p.sd)
+                    if unit.on is not None and unit.id in self.on and len(unit.variants) > 1:
+                        d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     self.point[p.name] = self.point.get(p.name, p.off) + d
             on.add(unit.id)
             del names
@@ -242,25 +244,21 @@ class Bench:
         # the unit first: its nuisances move the point before anything is compared
         for _ in range(FIRST):
             self.move(Model((), 0.0, 0.0, {}, {}), normal)
+            self.reweigh(whites, normal)
             whites = self.linearise()
             normal = self.normal(whites)
-            self.reweigh(whites, normal)
-        whites = self.linearise()
-        normal = self.normal(whites)
         leading: tuple[str, ...] = ()
+        search = self._search(normal)
         for _ in range(ROUNDS):
-            search = self._search(normal)
             best = search.ranked()[0]
             step = self.move(best, normal)
-            whites = self.linearise()
-            normal = self.normal(whites)
-            self.reweigh(whites, normal)
-            whites = self.linearise()
-            normal = self.normal(whites)
             if best.units == leading and step < STILL:
                 break
             leading = best.units
-        search = self._search(normal)
+            self.reweigh(whites, normal)
+            whites = self.linearise()
+            normal = self.normal(whites)
+            search = self._search(normal)
         return Fit(dict(self.point), whites, self.weights, search.ranked(), search.reduced, normal, search)
 
     def _search(self, normal: Normal) -> Search:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import Normal
 from .model import Block
-from .whitening import OUTLIER, autoregression, innovations, whiten
+from .whitening import OUTLIER, autoregression, whiten
 
 
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
@@ -66,11 +66,14 @@ def whitened(block: Block, weights: Weights | None, wanted: Sequence[str], remai
         raw[:, k] = c
     raw[:, -1] = block.residual
     usable = block.usable if weights is None else weights.usable
-    rows = whiten(block.bands, usable, raw)
-    if weights is not None:
-        rows = innovations(weights.coefficients, rows) / np.sqrt(weights.variance)
-        rows[~usable] = 0.0
+    rows = _white(block, weights, usable, raw)
     return White(block, names, rows, rows.T @ rows)
+
+
+def _white(block: Block, weights: Weights | None, usable: np.ndarray, raw: np.ndarray) -> np.ndarray:
+    if weights is None:
+        return whiten(block.bands, usable, raw)
+    return whiten(block.bands, usable, raw, weights.coefficients, weights.variance)
 
 
 def correct(white: White, disturbed: Block, weights: Weights | None) -> None:
@@ -88,10 +91,7 @@ def correct(white: White, disturbed: Block, weights: Weights | None) -> None:
     raw[:, -1] = disturbed.residual - block.residual
     changed = [k for k in range(raw.shape[1]) if np.any(raw[:, k])]
     usable = block.usable if weights is None else weights.usable
-    rows = whiten(block.bands, usable, raw[:, changed])
-    if weights is not None:
-        rows = innovations(weights.coefficients, rows) / np.sqrt(weights.variance)
-        rows[~usable] = 0.0
+    rows = _white(block, weights, usable, np.ascontiguousarray(raw[:, changed]))
     noise = (rows**2).sum(axis=0)
     power = np.diag(white.gram)[changed]
     most = np.where(np.array(changed) == raw.shape[1] - 1, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))

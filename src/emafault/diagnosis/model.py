@@ -26,6 +26,7 @@ class Variant:
 
     parameters: Sequence[Parameter]
     signs: Sequence[int] = ()
+    least: float = 0.0  # width of the prior, as a share of the parameters' own, below which the unit never is
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,73 @@
 """Rows of a block made white: by the noise's banded covariance, then by what a full model leaves."""
 
 import numpy as np
-from scipy.linalg import cholesky_banded, solve_banded
-from scipy.signal import lfilter
+
+from ..actuator.compiled import compiled
 
 LEFT_OUT = 1e8  # times a row's variance where it is not used
 OUTLIER = 5.5  # standard deviations of a full model's residual
 ORDER = 12  # largest order of the autoregressive model of what is left
 
 
-def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """(row, column) divided by the lower Cholesky factor of the covariance; rows not usable become zero."""
-    n = len(bands[0])
-    factor = np.zeros((len(bands), n))
-    for k, band in enumerate(bands):
-        factor[k, : n - k] = band
-    factor[0] = np.where(usable, factor[0], factor[0] * LEFT_OUT)
-    lower = cholesky_banded(factor, lower=True, check_finite=False)
-    out = solve_banded((len(bands) - 1, 0), lower, rows, check_finite=False)
-    out[~usable] = 0.0
+@compiled
+def _factor(bands, usable):
+    """Lower Cholesky factor (3, row) of a covariance with up to two off-diagonals, rows not used left out."""
+    n = bands.shape[1]
+    out = np.zeros((3, n))
+    for k in range(n):
+        d = bands[0, k] * (1.0 if usable[k] else LEFT_OUT)
+        l1, l2 = 0.0, 0.0
+        if k >= 2:
+            l2 = bands[2, k - 2] / out[0, k - 2]
+        if k >= 1:
+            below = bands[1, k - 1]
+            if k >= 2:
+                below -= l2 * out[1, k - 1]
+            l1 = below / out[0, k - 1]
+        rest = d - l1 * l1 - l2 * l2
+        out[0, k] = np.sqrt(max(rest, 1e-12 * d))
+        out[1, k], out[2, k] = l1, l2
     return out
+
+
+@compiled
+def _substitute(lower, usable, coefficients, scale, rows):
+    """Forward substitution, then the autoregressive filter, row by row in place; rows not used become zero."""
+    n, m = rows.shape
+    order = len(coefficients)
+    before = np.zeros((order + 1, m))  # of the rows before, as the substitution left them
+    one, two = np.zeros(m), np.zeros(m)
+    for k in range(n):
+        a, b, c = 1.0 / lower[0, k], lower[1, k], lower[2, k]
+        for q in range(m):
+            x = (rows[k, q] - b * one[q] - c * two[q]) * a
+            two[q] = one[q]
+            one[q] = x
+            rows[k, q] = x if usable[k] else 0.0
+        if order > 0:
+            slot = k % (order + 1)
+            for q in range(m):
+                before[slot, q] = rows[k, q]
+            for p in range(order):
+                if k - 1 - p < 0:
+                    break
+                past = (k - 1 - p) % (order + 1)
+                f = coefficients[p]
+                for q in range(m):
+                    rows[k, q] -= f * before[past, q]
+        for q in range(m):
+            rows[k, q] = rows[k, q] * scale if usable[k] else 0.0
+
+
+def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray, coefficients=(), variance: float = 1.0) -> np.ndarray:
+    """(row, column) made white in place: divided by the Cholesky factor of the banded covariance, then by the
+    autoregressive model of what a full model leaves; rows not usable become zero."""
+    n = len(bands[0])
+    full = np.zeros((3, n))
+    for k, band in enumerate(bands):
+        full[k, : n - k] = band
+    _substitute(_factor(full, usable), usable, np.asarray(coefficients, float), 1.0 / np.sqrt(variance), rows)
+    return rows
 
 
 def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
@@ -40,10 +88,3 @@ def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float
         if score < best:
             best, chosen, variance = score, a.copy(), error
     return chosen, float(variance)
-
-
-def innovations(coefficients: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Rows (row, column) less what the ones before them tell."""
-    if not len(coefficients):
-        return rows
-    return lfilter(np.concatenate([[1.0], -coefficients]), [1.0], rows, axis=0)

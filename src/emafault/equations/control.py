@@ -7,11 +7,13 @@ random walk out that the integral makes of the sensors' noise.
 
 import numpy as np
 
-from .dual import Dual, clip
+from .dual import Dual, clip, value_of
 from .point import State, effect_name
+from .sensor_speed import seen_speed
 from .terms import with_hook
 
 BLOCK = 2e-3  # s
+NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
 def residual(state: State) -> Dual:
@@ -21,8 +23,12 @@ def residual(state: State) -> Dual:
     # a demand is in force for one control period from the instant its inputs are sampled
     lead = 0.5 * a.control_period
     wanted = p("controller.position_gain") * (a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(rec.output, h, lead)))
-    error = clip(wanted, p("controller.speed_limit")) - _centred(rec.speed_recorded, h, lead)
-    integral = error.linear(lambda x: np.cumsum(x) * h, rec.size)
+    # a speed recorded in steps hides what the controller saw; the angle's rate shows it
+    seen = rec.speed_recorded if rec.speed_step == 0.0 else np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
+    error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
+    state.at_limit = _at_limit(rec)
+    # the integral rests while the demand is at its limit
+    integral = error.kept(~state.at_limit).linear(lambda x: np.cumsum(x) * h, rec.size)
     demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
     demand = clip(demand, p("controller.current_limit"))
     for m in with_hook("delay"):
@@ -33,6 +39,12 @@ def residual(state: State) -> Dual:
     pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
     width = block_length(rec)
     return (pair - demand).linear(lambda x: _blocks(x, width), rec.size)
+
+
+def _at_limit(rec) -> np.ndarray:
+    """(sample,) where the current stands at its highest: the demand is limited there."""
+    level = 0.5 * np.abs(rec.current).sum(axis=1)
+    return level > NEAR_LIMIT * rec.actuator.current_limit
 
 
 def block_length(rec) -> int:
@@ -63,7 +75,9 @@ def usable(state: State) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    return moving[1:] & moving[:-1]
+    free = ~_at_limit(rec)[: count * width].reshape(count, width).any(axis=1)
+    known = moving & free
+    return known[1:] & known[:-1]
 
 
 def noise_bands(state: State) -> list[np.ndarray]:

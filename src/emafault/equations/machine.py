@@ -17,6 +17,7 @@ HEALTHY = 1e-3
 EDGE_SCATTER = 3e-4  # electrical rad, by which the model of how current passes over may be wrong in a recording
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
+LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
 PER_PHASE = ("a", "b", "c")
 
@@ -101,14 +102,23 @@ class ReferenceActuator:
             parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units))
             positive.append(_sign(effect, name))
         shapes = getattr(module, "SHAPES", ())
-        variants = [Variant(parameters, positive)] if not shapes else []
+        least = max((0.5 * _nearest(effect, n) / q.sd for n, q in internal.items()), default=0.0)
+        variants = [Variant(parameters, positive, least)] if not shapes else []
         for n, shape in enumerate(shapes):
             full = f"{effect.id}#{n}"
             near = n > 0 and effect.id != "stribeck" or effect.id == "compliance"
             mean, sd = (1.0, 0.5) if near else (0.0, 2.0)
             parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
             variants.append(Variant([parameter], [0 if near else 1]))
-        return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive))
+        return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
+
+    def observed(self) -> dict[str, dict[str, float]]:
+        """Effects that the recordings show for certain, with their parameters: a speed that lies on a lattice."""
+        steps = [r.speed_step for r in self.recordings.values()]
+        least = EFFECTS["speed_quantisation"].parameters["step"].low
+        if "speed_quantisation" in self.effects and min(steps) >= 0.5 * least:
+            return {"speed_quantisation": {"step": float(np.median(steps))}}
+        return {}
 
     def _forms(self) -> list[Unit]:
         out = []
@@ -221,6 +231,7 @@ class ReferenceActuator:
             width = control.block_length(rec)
             count = rec.size // width - 1
             rows = (np.arange(count) + 1) * width
+            phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
         elif equation == "commutation":
             rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
         return {
@@ -244,6 +255,12 @@ def _not_first(rec: Signals) -> np.ndarray:
 def _fault(full: str, component: str) -> Parameter:
     turns = component.startswith("N")
     return Parameter(full, 0.0, 0.03 if turns else 0.0, 0.05 if turns else 0.1, "1")
+
+
+def _nearest(effect: Effect, name: str) -> float:
+    """Distance from off at which a parameter's realistic range begins."""
+    p = effect.parameters.get(name)
+    return max(p.low - p.nominal, p.nominal - p.high, 0.0) if p is not None else 0.0
 
 
 def _width(nominal: float, low: float, high: float) -> float:

@@ -15,18 +15,19 @@ def residual(state: State) -> Dual:
     noise is nearly independent of the residual's.
     """
     rec = state.rec
-    change = _seen(state, Dual(rec.speed)) - rec.speed
+    change = recorded_late(state.p, "speed", seen_speed(state, Dual(rec.speed)), rec.size) - rec.speed
     return rec.speed_recorded - rec.rate - change
 
 
-def _seen(state: State, w: Dual) -> Dual:
+def seen_speed(state: State, w: Dual) -> Dual:
+    """What the sensor makes of a true speed (rad/s)."""
     for m in with_hook("speed"):
         w = m.speed(state.p.of(effect_name(m)), state.rec, w)
-    return recorded_late(state.p, "speed", w, state.rec.size)
+    return w
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((rad/s)2)."""
     rec = state.rec
     angle = (rec.noise.angle / rec.interval) ** 2
-    return [np.full(rec.size, rec.noise.speed**2 + 2.0 * angle), np.full(rec.size - 1, -angle)]
+    return [np.full(rec.size, rec.noise.speed**2 + rec.speed_step**2 / 12.0 + 2.0 * angle), np.full(rec.size - 1, -angle)]

@@ -66,6 +66,7 @@ class Signals:
         slow = uniform_filter1d(self.rate, max(3, round(3e-3 / h)), mode="nearest")
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
+        self.speed_step = lattice_step(self.speed_recorded)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
 
@@ -89,6 +90,7 @@ class Signals:
             more(self.speed_recorded, s.speed), more(self.angle, s.angle), more(self.output, s.position), self.command,
             bus, self.ambient, self.health, s,
         )  # fmt: skip
+        out.speed_step = self.speed_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
         return out
 
@@ -115,3 +117,15 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     return replace(
         nominal, **{k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k))) for k, v in limits.items() if np.isfinite(v)}
     )
+
+
+def lattice_step(x: np.ndarray) -> float:
+    """Spacing of the lattice that a channel's values lie on; 0 where they lie on none that the samples fill."""
+    values = np.unique(x)
+    if len(values) > 0.5 * len(x) or len(values) < 3:
+        return 0.0
+    gaps = np.diff(values)
+    step = float(gaps.min())
+    times = gaps / step
+    on = np.abs(times - np.round(times)) < 1e-3 * np.maximum(times, 1.0)
+    return step if step > 1e-9 * np.ptp(x) and on.mean() > 0.99 else 0.0

@@ -3,14 +3,24 @@
 import numpy as np
 
 SENTENCE = "the friction falls with speed (Stribeck)"
-PARAMETERS = {"a": (0.0, 0.0, 0.018), "w_s": (8.0, 8.0, 5.0)}
-SHAPES = ({"a": 0.01, "w_s": 2.5}, {"a": 0.01, "w_s": 6.0}, {"a": 0.01, "w_s": 14.0})
+PARAMETERS = {"a": (0.0, 0.0, 0.018), "log_w_s": (1.8, 1.8, 0.7)}
+SHAPES = ({"a": 0.01, "log_w_s": 0.9}, {"a": 0.01, "log_w_s": 1.8}, {"a": 0.01, "log_w_s": 2.7})
 
 
 def torque(p, rec):
     """Resisting torque (N m)."""
-    a, w_s = p("a"), p("w_s")
-    size = max(w_s.value, 0.5)
-    decay = np.exp(-np.abs(rec.speed) / size)
-    value = rec.direction * decay
-    return a * value + w_s.through(0.0, a.value * value * np.abs(rec.speed) / size**2)
+    a, log_w_s = p("a"), p("log_w_s")
+    x = np.abs(rec.speed) / np.exp(np.clip(log_w_s.value, -1.0, 4.0))
+    value = rec.direction * np.exp(-x)
+    return a * value + log_w_s.through(0.0, a.value * value * x)
+
+
+def report(value, deviation):
+    """Catalogue parameters from the fitted ones: name -> (value, standard deviation)."""
+    w_s = float(np.exp(value["log_w_s"]))
+    return {"a": (value["a"], deviation["a"]), "w_s": (w_s, w_s * deviation["log_w_s"])}
+
+
+def catalogue(value):
+    """Catalogue parameters for the simulator."""
+    return {"a": value["a"], "w_s": float(np.exp(value["log_w_s"]))}

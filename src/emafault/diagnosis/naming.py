@@ -1,0 +1,98 @@
+"""From a posterior over sets to names: one rule, an inclusion probability of at least ``NAMED``.
+
+Effects whose inclusions reach it only together, one standing in for the other in the sets of the posterior, are a group.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .model import Unit
+from .search import Model, posterior
+
+NAMED = 0.9
+PRESENT = 0.5  # of a remainder, from which it is more likely there than not
+LISTED = ("structural", "calibration")
+MEMBERS = 4  # largest group
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a posterior says: names, groups, forms, equations with a remainder, and the masses they rest on."""
+
+    named: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...]
+    forms: tuple[str, ...]
+    remainders: tuple[str, ...]
+    inclusion: Mapping[str, float]
+    sets: Sequence[tuple[tuple[str, ...], float, Model]]  # listed effects of a set, its mass, its leading model
+    empty: float  # mass of sets without listed effect and remainder
+    unknown: float  # mass of sets without listed effect, with a remainder
+    verdict: str
+
+
+def read(models: Sequence[Model], units: Sequence[Unit], observed: Sequence[str] = ()) -> Reading:
+    """Read a posterior; effects ``observed`` for certain belong to every set."""
+    kind = {u.id: u.kind for u in units}
+    weights = posterior(models)
+    inclusion: dict[str, float] = {e: 1.0 for e in observed}
+    masses: dict[tuple[str, ...], float] = {}
+    leading: dict[tuple[str, ...], Model] = {}
+    empty = unknown = 0.0
+    for model, w in zip(models, weights, strict=True):
+        listed = tuple(sorted({*observed, *(u for u in model.units if kind.get(u) in LISTED)}))
+        for u in model.units:
+            inclusion[u] = inclusion.get(u, 0.0) + float(w)
+        if listed:
+            masses[listed] = masses.get(listed, 0.0) + float(w)
+            leading.setdefault(listed, model)
+        elif any(kind.get(u, "remainder") == "remainder" for u in model.units):
+            unknown += float(w)
+        else:
+            empty += float(w)
+    named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
+    groups = _groups(models, weights, [e for e in inclusion if kind.get(e) in LISTED and e not in named], inclusion)
+    forms = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e) == "form"))
+    remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
+    sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
+    nothing = max(0.0, empty)
+    if named and not groups:
+        verdict = "partly" if forms or remainders else "explained"
+    elif groups:
+        verdict = "partly" if forms or remainders else "group"
+    elif forms:
+        verdict = "described"
+    elif nothing >= 0.5:
+        verdict = "no_gap"
+    else:
+        verdict = "unknown"
+    return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, verdict)
+
+
+def _groups(models, weights, effects, inclusion) -> tuple[tuple[str, ...], ...]:
+    """Smallest sets of effects of which exactly one is included with probability ``NAMED`` or more."""
+    likely = sorted((e for e in effects if inclusion[e] >= 0.02), key=lambda e: -inclusion[e])[:8]
+    units = [set(m.units) for m in models]
+    out: list[tuple[str, ...]] = []
+    used: set[str] = set()
+    for size in range(2, MEMBERS + 1):
+        for group in combinations(likely, size):
+            if used & set(group) or inclusion[group[0]] > 0.0 and sum(inclusion[e] for e in group) < NAMED:
+                continue
+            one = sum(float(w) for u, w in zip(units, weights, strict=True) if len(u & set(group)) == 1)
+            if one >= NAMED and min(inclusion[e] for e in group) >= 0.02:
+                out.append(tuple(sorted(group)))
+                used |= set(group)
+    return tuple(out)
+
+
+def mixture(reading: Reading, most: int = 8) -> list[tuple[Model, float]]:
+    """Leading models of the likeliest sets with their masses, for averages over what is believable."""
+    chosen = [(m, p) for _, p, m in reading.sets[:most] if p > 0.01]
+    total = sum(p for _, p in chosen)
+    return [(m, p / total) for m, p in chosen] if total > 0.0 else []
+
+
+__all__ = ["NAMED", "Reading", "mixture", "np", "read"]
