@@ -15,7 +15,8 @@ REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
 BEAM = 4
-SWAPPED = 10  # units tried in the place of each member
+ADDED = 30  # units tried in addition to a set
+SWAPPED = 8  # units tried in the place of each member
 NEAR = 12.0  # log posterior within which a set is worth extending
 
 
@@ -174,20 +175,37 @@ class Search:
         inside = tuple((c.unit, c.variant) for c in model.choices)
         widths = {(c.unit, c.variant): c.width for c in model.choices}
         names = {u for u, _ in inside}
-        added = []
-        for m in self.candidates:
+        for m in self._promising(model, names, ADDED):
             grown = (*inside, m)
-            if m[0] not in names and np.isfinite(self.log_prior(grown)):
-                added.append((self.fit(grown, widths).log_posterior, m))
-        worth = [m for _, m in sorted(added, key=lambda x: -x[0])[:SWAPPED]]
+            if np.isfinite(self.log_prior(grown)):
+                self.fit(grown, widths)
         for out in inside:
             kept = tuple(m for m in inside if m != out)
-            self.fit(kept, widths)
+            less = self.fit(kept, widths)
             others = [m for m in self.candidates if m[0] == out[0] and m != out]
-            for m in [*worth, *others]:
+            for m in [*self._promising(less, names, SWAPPED), *others]:
                 swapped = (*kept, m)
                 if np.isfinite(self.log_prior(swapped)):
                     self.fit(swapped, widths)
+
+    def _promising(self, model: Model, inside: set[str], most: int) -> list[tuple[str, int]]:
+        """Candidates by what each alone would add to a model, the others held where the model has them."""
+        r = self.reduced
+        d = r.fixed.copy()
+        for n, value in model.deviations.items():
+            d[r.index[n]] = value
+        on = np.flatnonzero(d)
+        left = r.b - (r.M[:, on] @ d[on] if len(on) else 0.0)
+        scores = []
+        for m, c in self.candidates.items():
+            if m[0] in inside:
+                continue
+            step = c.mean - d[c.index]
+            A = r.M[np.ix_(c.index, c.index)] * np.outer(c.sd, c.sd) + np.eye(len(c.index))
+            g = (left[c.index] - r.M[np.ix_(c.index, c.index)] @ step) * c.sd
+            gain = left[c.index] @ step - 0.5 * step @ r.M[np.ix_(c.index, c.index)] @ step + 0.5 * g @ np.linalg.solve(A, g)
+            scores.append((float(gain), m))
+        return [m for _, m in sorted(scores, key=lambda x: -x[0])[:most]]
 
 
 def _log_choose(n: int, k: int) -> float:

@@ -6,13 +6,16 @@ random walk out that the integral makes of the sensors' noise.
 """
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
+from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
 from .terms import with_hook
 
 BLOCK = 2e-3  # s
+AVERAGED = 1e-2  # s
 NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
@@ -22,19 +25,23 @@ def residual(state: State) -> Dual:
     h = rec.interval
     # a demand is in force for one control period from the instant its inputs are sampled
     lead = 0.5 * a.control_period
-    wanted = p("controller.position_gain") * (a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(rec.output, h, lead)))
-    # a speed recorded in steps hides what the controller saw; the angle's rate shows it
-    seen = rec.speed_recorded if rec.speed_step == 0.0 else np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
+    # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
+    # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
+    model = np.asarray(value_of(position.shaft_angle(state)))
+    output = model + uniform_filter1d(rec.output - model, max(1, round(AVERAGED / h)), mode="nearest")
+    model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
+    seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
+    wanted = p("controller.position_gain") * (a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(output, h, lead)))
     error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
     state.at_limit = _at_limit(rec)
     # the integral rests while the demand is at its limit
     integral = error.kept(~state.at_limit).linear(lambda x: np.cumsum(x) * h, rec.size)
     demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
     demand = clip(demand, p("controller.current_limit"))
+    late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
-        late = m.delay(p.of(effect_name(m)))
-        rate = np.gradient(np.asarray(demand.value), h)
-        demand = demand - late * rate
+        late = late + m.delay(p.of(effect_name(m)))
+    demand = demand - late * np.gradient(np.asarray(demand.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
     pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
     width = block_length(rec)
@@ -84,9 +91,10 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (A2)."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
     width = block_length(rec)
-    demand = a.speed_gain * np.hypot(s.speed, a.gear_ratio * a.position_gain * s.position)
+    averaged = np.sqrt(max(1, round(AVERAGED / rec.interval)))
+    demand = a.speed_gain * np.hypot(s.speed, a.gear_ratio * a.position_gain * s.position) / averaged
     ripple = 0.1 * a.hysteresis
-    white = (demand**2 + s.current**2 + ripple**2) / width + (0.02 * a.hysteresis) ** 2
+    white = (s.current**2 + ripple**2) / width + demand**2 + (0.005 * a.hysteresis) ** 2
     walk = (a.speed_integral_gain / a.speed_gain * demand) ** 2 * rec.interval * width * rec.interval
     count = rec.size // width - 1
     return [np.full(count, 2.0 * white + walk), np.full(count - 1, -white)]

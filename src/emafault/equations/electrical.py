@@ -7,6 +7,7 @@ between the interval's ends.
 import numpy as np
 
 from .acquisition import recorded_late
+from .commutation import rows_of
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
@@ -47,6 +48,17 @@ def residuals(state: State) -> dict[str, Dual]:
     for j, name in enumerate(NAMES):
         drift = p(f"drift_voltage.{'abc'[j]}@{rec.name}")
         out[name] = rec.voltage[:, j] - true[j] - drift * share
+    return out
+
+
+def usable(state: State, j: int) -> np.ndarray:
+    """(sample,) where the flux's change is known: without end currents not where the phase is switched on or off."""
+    rec = state.rec
+    out = np.ones(rec.size, bool)
+    if rec.current_end is None:
+        for edge in (j, (j + 1) % 3):
+            for shift in (-1, 0, 1):
+                out[np.clip(rows_of(state, edge) + shift, 0, rec.size - 1)] = False
     return out
 
 

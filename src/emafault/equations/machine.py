@@ -15,6 +15,8 @@ from .terms import TERMS
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 3e-4  # electrical rad, by which the model of how current passes over may be wrong in a recording
+ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
+TIMING = 0.05  # of a recording interval, by which means and samples within it may be told apart
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
@@ -70,6 +72,9 @@ class ReferenceActuator:
         unknown = False
         for name, rec in self.recordings.items():
             out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
+            out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
+            full = f"controller.timing@{name}"
+            out[full] = Parameter(full, 0.0, 0.0, TIMING * rec.interval + 0.1 * a.control_period, "s")
             for j in PER_PHASE:
                 full = f"controller.edge_{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
@@ -156,7 +161,7 @@ class ReferenceActuator:
         state = State(rec, point)
         found = []
         for j, (name, r) in enumerate(electrical.residuals(state).items()):
-            found.append((name, r, electrical.noise_bands(state, j), _not_first(rec)))
+            found.append((name, r, electrical.noise_bands(state, j), _not_first(rec) & electrical.usable(state, j)))
         found.append(("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec)))
         found.append(("sensor_speed", sensor_speed.residual(state), sensor_speed.noise_bands(state), _not_first(rec)))
         found.append(("torque", torque.residual(state), torque.noise_bands(state), torque.usable(state)))

@@ -23,8 +23,8 @@ def through_play(gear, half):
     return out, slope
 
 
-def residual(state: State) -> Dual:
-    """Recorded less predicted angle of the user shaft (rad)."""
+def shaft_angle(state: State) -> Dual:
+    """Angle of the user shaft behind the gear's play and flexibility (rad)."""
     rec = state.rec
     play: Dual | float = 0.0
     for m in with_hook("play"):
@@ -33,7 +33,13 @@ def residual(state: State) -> Dual:
     shaft = play.through(value, 0.5 * slope)
     for m in with_hook("twist"):
         shaft = m.twist(state.p.of(effect_name(m)), rec, shaft, float(value_of(play)))
-    return rec.output - recorded_late(state.p, "output", shaft, rec.size)
+    return shaft
+
+
+def residual(state: State) -> Dual:
+    """Recorded less predicted angle of the user shaft (rad)."""
+    shaft = shaft_angle(state) + state.p(f"output_zero@{state.rec.name}")
+    return state.rec.output - recorded_late(state.p, "output", shaft, state.rec.size)
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
