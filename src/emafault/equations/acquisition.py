@@ -34,6 +34,9 @@ def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
         out = out + late * x.linear(delayed, size)
     if early.slopes or early.value:
         out = out + early * x.linear(advanced, size)
+    skew = p(f"skew.{channel}@{p.recording}")
+    if skew.slopes:
+        out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
     return out
 
 

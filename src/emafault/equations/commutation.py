@@ -13,14 +13,19 @@ from .terms import with_hook
 
 EDGE = np.pi / 6.0
 REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors may move it by
+LONGEST = 0.35  # of an interval, that a current may take to pass over
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 
 def rows_of(state: State, j: int) -> np.ndarray:
     """Intervals in which an edge of phase j may lie."""
     low, high, _ = _sweep(state.rec.rows_from, j)
+    rec = state.rec.rows_from
     half = high - low < np.pi / 3.0
-    return np.flatnonzero((low < REACH) & (high > -REACH) & state.rec.rows_from.moving & half)
+    a = rec.actuator
+    passing = 2.0 * a.inductance * np.abs(rec.current[:, STAYS[j]]) / a.bus_voltage  # s, about
+    short = passing < LONGEST * rec.interval
+    return np.flatnonzero((low < REACH) & (high > -REACH) & rec.moving & half & short)
 
 
 def _sweep(rec, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,9 +16,10 @@ NAMES = ("electrical_a", "electrical_b", "electrical_c")
 
 
 def voltages(state: State) -> list[Dual]:
-    """Mean true voltage of each phase, terminal to star point (V)."""
+    """Mean true voltage of each phase, terminal to star point, without that of the inductance (V)."""
     rec, a = state.rec, state.rec.actuator
     out = []
+    state.rise = []
     for j in range(3):
         flux = state.current_end[j]
         for m in with_hook("flux"):
@@ -27,8 +28,13 @@ def voltages(state: State) -> list[Dual]:
         for m in with_hook("inductance"):
             L = L * m.inductance(state.p.of(effect_name(m)), rec, j)
         L = L * state.turns[j] * state.turns[j]
-        rise = flux.linear(_difference, rec.size) * (1.0 / rec.interval)
-        out.append(state.resistance[j] * state.current[j] + L * rise + state.k[j] * state.swept[j])
+        rise = L * flux.linear(_difference, rec.size) * (1.0 / rec.interval)
+        if rec.current_end is None:  # the ripple outweighs what neighbouring means tell of the flux
+            rise = Dual(rise.value)
+        state.rise.append(rise)
+        back_emf = np.asarray(value_of(state.k[j] * state.swept[j]))
+        by_calm = state.k[j] * state.regressor[j]
+        out.append(state.resistance[j] * state.current[j] + Dual(back_emf, by_calm.slopes))
     return out
 
 
@@ -39,7 +45,11 @@ def _difference(x: np.ndarray) -> np.ndarray:
 def residuals(state: State) -> dict[str, Dual]:
     """Recorded less predicted voltage (V) of each phase."""
     rec, p = state.rec, state.p
-    true = [recorded_late(p, "voltage", v, rec.size) for v in voltages(state)]
+    true = voltages(state)
+    if rec.current_end is None:
+        true = [recorded_late(p, "voltage", v, rec.size) + rise for v, rise in zip(true, state.rise, strict=True)]
+    else:
+        true = [recorded_late(p, "voltage", v + rise, rec.size) for v, rise in zip(true, state.rise, strict=True)]
     modules = sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False))
     for m in modules:
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]

@@ -17,6 +17,7 @@ HEALTHY = 1e-3
 EDGE_SCATTER = 3e-4  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
 TIMING = 0.05  # of a recording interval, by which means and samples within it may be told apart
+SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
@@ -72,6 +73,8 @@ class ReferenceActuator:
         unknown = False
         for name, rec in self.recordings.items():
             out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
+            full = f"skew.voltage@{name}"
+            out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
             out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
             full = f"controller.timing@{name}"
             out[full] = Parameter(full, 0.0, 0.0, TIMING * rec.interval + 0.1 * a.control_period, "s")
@@ -127,7 +130,7 @@ class ReferenceActuator:
 
     def _forms(self) -> list[Unit]:
         out = []
-        for channel in ("voltage", "current", "speed", "output"):
+        for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
             variants = [
                 Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1]) for side in ("late", "early")
             ]
@@ -219,7 +222,7 @@ class ReferenceActuator:
         drivers = [np.ones(rec.size)]
         if equation.startswith("electrical"):
             j = "abc".index(equation[-1])
-            drivers += [rec.current[:, j], np.asarray(state.swept[j].value) * 0.02]
+            drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * 0.02]
         elif equation == "torque":
             drivers += [rec.direction]
         elif equation == "sensor_speed":

@@ -42,10 +42,14 @@ def _angles(state: State) -> None:
     rec = state.rec
     shift, ramp = _sum(state, "angle"), _sum(state, "ramp")
     poles = rec.actuator.pole_pairs
-    state.swept, state.conducting, state.at_middle = [], [], []
+    state.swept, state.regressor, state.conducting = [], [], []
+    per = 1.0 / (poles * rec.interval)
     for j in range(3):
         low, high = poles * rec.before - rec.axis[j], poles * rec.angle - rec.axis[j]
-        state.swept.append(_mean_shape(state, low, high, shift, ramp) * (1.0 / (poles * rec.interval)))
+        state.swept.append(_mean_shape(state, low, high, shift, ramp) * per)
+        # what effects make of it is taken of a smoothed angle, whose noise is not that of the residual
+        calm_low, calm_high = poles * rec.calm_before - rec.axis[j], poles * rec.calm - rec.axis[j]
+        state.regressor.append(_mean_shape(state, calm_low, calm_high, shift, ramp) * per)
         state.conducting.append(_conducting_shape(state, np.minimum(low, high), np.maximum(low, high), shift, ramp))
 
 

@@ -55,6 +55,8 @@ class Signals:
         self.rate = (theta - self.before) / h
         span = max(1, round(SPEED_SPAN / h))
         self.speed = uniform_filter1d(self.rate, span, mode="nearest")
+        self.calm = uniform_filter1d(theta, span, mode="nearest")
+        self.calm_before = np.concatenate([self.calm[:1], self.calm[:-1]])
         self.direction = np.sign(self.speed)
         moving = np.abs(self.speed) > SLOW
         # dry friction is known where the rotor moves throughout

@@ -11,10 +11,14 @@ from .point import State, effect_name
 from .terms import with_hook
 
 
+UNRESOLVED = 0.2  # of the change from interval to interval: where within one a torque changes is not recorded
+
+
 def net_torque(state: State) -> Dual:
     """Mean torque on the rotor in each interval (N m)."""
     rec, a = state.rec, state.rec.actuator
     drive = [state.k[j] * state.conducting[j] * state.current[j] for j in range(3)]
+    state.drive = sum((np.asarray(d.value) for d in drive), np.zeros(rec.size))
     level: Dual | float = a.coulomb_friction
     for m in with_hook("friction"):
         level = level * m.friction(state.p.of(effect_name(m)), rec)
@@ -61,8 +65,10 @@ def noise_bands(state: State) -> list[np.ndarray]:
     angle = (a.inertia * s.angle / rec.interval**2) ** 2
     current = 2.0 * (a.back_emf * s.current) ** 2
     n = rec.size
+    change = np.abs(np.diff(state.drive, append=state.drive[-1:]))
+    change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     return [
-        np.full(n, 6.0 * angle + 0.5 * current),
+        6.0 * angle + 0.5 * current + (UNRESOLVED * change) ** 2,
         np.full(n - 1, -4.0 * angle + 0.25 * current),
         np.full(n - 2, angle),
     ]
