@@ -237,13 +237,14 @@ class Bench:
             self.point[own.name] = own.off + (at - own.off) * amount if first else at
             first = False
 
-    def fit(self) -> Fit:
-        """Search and relinearise until the leading set stands still."""
+    def fit(self, warm: bool = False) -> Fit:
+        """Search and relinearise until the leading set stands still; ``warm`` begins at the point as it is."""
         whites = self.linearise()
         normal = self.normal(whites)
         # the unit first: its nuisances move the point before anything is compared
-        for _ in range(FIRST):
-            self.move(Model((), 0.0, 0.0, {}, {}), normal)
+        for _ in range(1 if warm else FIRST):
+            if not warm:
+                self.move(Model((), 0.0, 0.0, {}, {}), normal)
             self.reweigh(whites, normal)
             whites = self.linearise()
             normal = self.normal(whites)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from .evidence import Normal
 from .model import Block
@@ -140,8 +141,9 @@ def weights_from(white: White, deviations: dict[str, float], before: Weights | N
     usable = block.usable if before is None else before.usable
     d = np.array([deviations.get(n, 0.0) for n in white.names])
     left = white.rows[:, :-1] @ d + white.rows[:, -1]
-    if before is not None:
-        left = left * np.sqrt(before.variance)
+    if before is not None:  # as the banded covariance alone leaves it
+        filtered = np.concatenate([[1.0], -before.coefficients])
+        left = lfilter([1.0], filtered, left * np.sqrt(before.variance))
     if usable.sum() < 30:
         return Weights(np.zeros_like(usable), np.zeros(0), 1.0)
     scale = np.median(np.abs(left[usable])) / 0.6745
@@ -151,8 +153,4 @@ def weights_from(white: White, deviations: dict[str, float], before: Weights | N
     if keep.sum() < 0.5 * usable.sum():
         keep = usable
     coefficients, variance = autoregression(np.where(keep, left, 0.0), keep)
-    if before is not None and len(before.coefficients):
-        # the residual was already filtered: refine the filter that made it white
-        both = np.convolve(np.concatenate([[1.0], -before.coefficients]), np.concatenate([[1.0], -coefficients]))
-        coefficients = -both[1:]
     return Weights(keep, coefficients, max(variance, 1e-6))

@@ -15,6 +15,8 @@ from .search import Model, posterior
 NAMED = 0.9
 PRESENT = 0.5  # of a remainder, from which it is more likely there than not
 LISTED = ("structural", "calibration")
+#: what the controller does with what it sees is no gap of the machine
+OWN_BUSINESS = ("remainder:control", "remainder:commutation")
 MEMBERS = 4  # largest group
 
 
@@ -48,7 +50,7 @@ def read(models: Sequence[Model], units: Sequence[Unit], observed: Sequence[str]
         if listed:
             masses[listed] = masses.get(listed, 0.0) + float(w)
             leading.setdefault(listed, model)
-        elif any(kind.get(u, "remainder") == "remainder" for u in model.units):
+        elif any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units):
             unknown += float(w)
         else:
             empty += float(w)
@@ -58,10 +60,11 @@ def read(models: Sequence[Model], units: Sequence[Unit], observed: Sequence[str]
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
     nothing = max(0.0, empty)
+    beside = [r for r in remainders if r not in OWN_BUSINESS]
     if named and not groups:
-        verdict = "partly" if forms or remainders else "explained"
+        verdict = "partly" if forms or beside else "explained"
     elif groups:
-        verdict = "partly" if forms or remainders else "group"
+        verdict = "partly" if forms or beside else "group"
     elif forms:
         verdict = "described"
     elif nothing >= 0.5:

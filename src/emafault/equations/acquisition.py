@@ -49,6 +49,9 @@ def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:
         out = out + late * advanced(plain)
     if early.slopes or early.value:
         out = out + early * delayed(plain)
+    skew = p(f"skew.{channel}@{p.recording}")
+    if skew.slopes:
+        out = out + skew * (0.5 * (advanced(plain) - delayed(plain)))
     return out
 
 

@@ -83,7 +83,9 @@ def usable(state: State) -> np.ndarray:
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
     free = ~_at_limit(rec)[: count * width].reshape(count, width).any(axis=1)
-    known = moving & free
+    # through zero the mean of a magnitude is not the magnitude of the mean
+    level = 0.5 * np.abs(rec.current).sum(axis=1)[: count * width].reshape(count, width)
+    known = moving & free & (level.min(axis=1) > rec.actuator.hysteresis)
     return known[1:] & known[:-1]
 
 

@@ -71,7 +71,7 @@ def diagnose(
     every = Bench(whole, list(recordings))
     begun = every.point | {n: v for n, v in bench.point.items() if n in every.point}
     every.point, every.on = begun, set(bench.on)
-    all_fit = every.fit()
+    all_fit = every.fit(warm=True)
     final = read(all_fit.models, all_fit.search.units.values(), tuple(whole.observed()))
     ladder = Ladder(whole, confirm, every.parameters, all_fit.weights)
     return _verdict(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings)

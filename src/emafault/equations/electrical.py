@@ -44,21 +44,23 @@ def _difference(x: np.ndarray) -> np.ndarray:
 
 def residuals(state: State) -> dict[str, Dual]:
     """Recorded less predicted voltage (V) of each phase."""
-    rec, p = state.rec, state.p
-    true = voltages(state)
-    if rec.current_end is None:
-        true = [recorded_late(p, "voltage", v, rec.size) + rise for v, rise in zip(true, state.rise, strict=True)]
-    else:
-        true = [recorded_late(p, "voltage", v + rise, rec.size) for v, rise in zip(true, state.rise, strict=True)]
-    modules = sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False))
-    for m in modules:
-        true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
+    rec = state.rec
+    true = _recorded(state, [v + rise for v, rise in zip(voltages(state), state.rise, strict=True)])
     share = rec.time / rec.time[-1]
     out = {}
     for j, name in enumerate(NAMES):
-        drift = p(f"drift_voltage.{'abc'[j]}@{rec.name}")
+        drift = state.p(f"drift_voltage.{'abc'[j]}@{rec.name}")
         out[name] = rec.voltage[:, j] - true[j] - drift * share
     return out
+
+
+def _recorded(state: State, true: list[Dual]) -> list[Dual]:
+    """What is recorded of the true voltages: lag, gains, then the star point."""
+    p = state.p
+    true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
+    for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
+        true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
+    return true
 
 
 def usable(state: State, j: int) -> np.ndarray:

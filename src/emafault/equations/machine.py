@@ -14,9 +14,10 @@ from .terms import TERMS
 
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
-EDGE_SCATTER = 3e-4  # electrical rad, by which the model of how current passes over may be wrong in a recording
+EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
-TIMING = 0.05  # of a recording interval, by which means and samples within it may be told apart
+TIMING = 0.1  # of a recording interval, by which means and samples within it may be told apart
+LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -73,8 +74,9 @@ class ReferenceActuator:
         unknown = False
         for name, rec in self.recordings.items():
             out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
-            full = f"skew.voltage@{name}"
-            out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
+            for channel in ("voltage", "current"):
+                full = f"skew.{channel}@{name}"
+                out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
             out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
             full = f"controller.timing@{name}"
             out[full] = Parameter(full, 0.0, 0.0, TIMING * rec.interval + 0.1 * a.control_period, "s")
@@ -132,7 +134,8 @@ class ReferenceActuator:
         out = []
         for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
             variants = [
-                Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1]) for side in ("late", "early")
+                Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
+                for side in ("late", "early")
             ]
             out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants))
         pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]

@@ -100,24 +100,32 @@ class Signals:
 def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> SensorNoise:
     """Noise of the channels that regressors are made of, from differences in which the motion hardly shows.
 
-    The smallest over the recordings counts: motion between samples can only add to a difference.
+    The angle's is taken of the most finely sampled recordings, that of the end currents where a phase floats.
     """
-    def robust(x: np.ndarray) -> float:
-        return float(np.median(np.abs(x - np.median(x))) / 0.6745) if len(x) else np.inf
+    def robust(parts: list[np.ndarray]) -> float:
+        x = np.concatenate(parts) if parts else np.zeros(0)
+        return float(np.median(np.abs(x - np.median(x))) / 0.6745) if len(x) > 50 else np.inf
 
-    angle = min(robust(np.diff(r.rotor_angle, 3)) / np.sqrt(20.0) for r in recordings)
-    current = min(robust(np.diff(r.phase_current.sum(axis=1), 2)) / np.sqrt(18.0) for r in recordings)
-    end = np.inf
+    finest = min(r.interval for r in recordings)
+    fine = [r for r in recordings if r.interval < 1.5 * finest]
+    angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
+    current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
+    ends: list[np.ndarray] = []
     for r in recordings:
-        if r.phase_current_end is None:
-            continue
         for j in range(3):
-            off = np.abs(r.phase_current[:, j]) < 5.0 * max(current, 1e-6)
+            off = np.abs(r.phase_current[:, j]) < 4.0 * current
             still = off & np.roll(off, 1) & np.roll(off, -1)
-            end = min(end, robust(r.phase_current_end[still, j])) if still.sum() > 50 else end
-    limits = {"angle": angle, "current": current, "current_end": end}
+            if r.phase_current_end is not None and still.sum() > 20:
+                x = r.phase_current_end[still, j]
+                ends.append(x - np.median(x))
+    limits = {"angle": angle, "current": current, "current_end": robust(ends)}
     return replace(
-        nominal, **{k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k))) for k, v in limits.items() if np.isfinite(v)}
+        nominal,
+        **{
+            k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k)))
+            for k, v in limits.items()
+            if np.isfinite(v)
+        },
     )
 
 

@@ -1,0 +1,47 @@
+"""Recordings simulated with known parameters, and the point at which their equations must hold."""
+
+import numpy as np
+import pytest
+
+from emafault import config
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import ActuatorParameters, make_runs
+from emafault.actuator.sensors import SensorNoise, measure
+from emafault.actuator.simulate import simulate, time_axis
+from emafault.equations.machine import ReferenceActuator
+from emafault.equations.signals import Signals
+from emafault.recording import Recording
+
+SPEC = config.diagnosis_spec(config.compose())
+ACTUATOR = ActuatorParameters(**SPEC["actuator"])
+NOISE = SensorNoise(**SPEC["sensors"])
+COMMANDS = {
+    "parabolic": {"acceleration": 0.3},
+    "reversal": {"amplitude": 0.04, "speed": 0.25},
+    "sine": {"amplitude": 0.02, "frequency": 2.0},
+}
+
+
+def recorded(
+    command="parabolic", effects=None, fault=(0.0,) * 6, seed=0, actuator=ACTUATOR, interval=2e-4, theta_0=0.7, health="healthy"
+):
+    """A recording of a unit with these effects and faults."""
+    runs = make_runs(actuator, np.array([fault]), effects=effects or {}, theta_0=theta_0)
+    position = command_positions(command, COMMANDS[command], 0.8, actuator.control_period)
+    out = measure(simulate(runs, position, 0.8, interval), runs, NOISE, seed)
+    ambient = float(out.pop("ambient_temperature")[0])
+    return Recording(
+        time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": health, "command": command},
+        **{k: v[0] for k, v in out.items()},
+    )  # fmt: skip
+
+
+def machine_of(recordings, exclude=()):
+    """The diagnosis' view of recordings by name."""
+    return ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, NOISE) for n, r in recordings.items()}, exclude)
+
+
+@pytest.fixture
+def nominal():
+    """A machine with one nominal recording."""
+    return machine_of({"a.nc": recorded()})

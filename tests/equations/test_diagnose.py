@@ -1,0 +1,98 @@
+"""Whole diagnoses by equation errors: what is named, beside what, and what must change nothing."""
+
+import hashlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emafault.equations.diagnose import diagnose
+from emafault.errors import InputError
+
+from .conftest import ACTUATOR, NOISE, recorded
+
+PLANS = (("parabolic", 30.0, 0.3), ("reversal", 30.0, 1.1), ("sine", -20.0, 2.0), ("parabolic", -20.0, 4.0))
+
+
+def bench(effects=None, actuator=ACTUATOR):
+    """Four healthy recordings of one unit."""
+    return {
+        f"r{n}.nc": recorded(command, effects, (0.0,) * 5 + (dT,), seed=n, actuator=actuator, theta_0=theta_0)
+        for n, (command, dT, theta_0) in enumerate(PLANS)
+    }
+
+
+def verdict_of(recordings, **options):
+    names = list(recordings)
+    return diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, **options)
+
+
+COGGING = {"cogging": {"a": 0.004}}
+
+
+@pytest.fixture(scope="module")
+def cogging():
+    return verdict_of(bench(COGGING))
+
+
+def test_nominal_bench_has_no_gap():
+    verdict = verdict_of(bench())
+    assert verdict["verdict"] == "no_gap"
+    assert verdict["which"][0]["effects"] == []
+    assert sum(e["probability"] for e in verdict["which"]) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_an_effect_is_named_with_its_size(cogging):
+    first = cogging["which"][0]
+    assert (cogging["verdict"], first["effects"]) == ("explained", ["cogging"])
+    a = first["parameters"]["a"]
+    assert a["low"] < 0.004 < a["high"]
+    assert cogging["where"][0]["equation"] == "torque"
+    assert cogging["shrinks"]["signal"]["closed"] > 0.9
+
+
+def test_the_seal_can_be_recomputed(cogging):
+    sealed = dict(cogging["sealed"])
+    digest = sealed.pop("digest")
+    text = json.dumps(sealed, sort_keys=True, separators=(",", ":"))
+    assert hashlib.sha256(text.encode()).hexdigest() == digest
+
+
+def test_a_position_gain_changes_no_plant_effect(cogging):
+    other = replace(ACTUATOR, position_gain=130.0, speed_gain=0.2)
+    verdict = verdict_of(bench(COGGING, other))
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    for effect, p in verdict["inclusion"].items():
+        if effect != "control_delay":
+            assert p == pytest.approx(cogging["inclusion"][effect], abs=0.05), effect
+    gain = verdict["controller"]["position_gain"]
+    assert gain["low"] < 130.0 < gain["high"] and gain["nominal"] == 100.0
+
+
+def test_an_effect_is_named_beside_a_lag_of_the_voltage():
+    late = {}
+    for name, r in bench(COGGING).items():
+        voltage = np.vstack([r.phase_voltage[:1], r.phase_voltage[:-1]])
+        late[name] = replace(r, phase_voltage=voltage)
+    verdict = verdict_of(late)
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    assert [d["form"] for d in verdict["discovered"]] == ["lag"]
+    assert verdict["verdict"] == "partly"
+
+
+def test_names_and_order_of_files_change_nothing(cogging):
+    recordings = bench(COGGING)
+    renamed = {f"x{9 - n}.nc": r for n, r in enumerate(recordings.values())}
+    names = list(renamed)
+    explore, confirm = names[:3], names[3:]
+    verdict = diagnose(
+        "bench", dict(reversed(list(renamed.items()))), (explore[::-1], confirm), ACTUATOR, NOISE
+    )
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    assert verdict["inclusion"] == pytest.approx(cogging["inclusion"], abs=1e-3)
+
+
+def test_an_effect_that_does_not_exist_is_refused():
+    with pytest.raises(InputError, match="nothing_such"):
+        verdict_of(bench(), exclude=("nothing_such",))

@@ -1,0 +1,140 @@
+"""At the simulated point the residual of every equation is the sensors' noise, whatever effect is on."""
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.whitening import whiten
+from emafault.effects import EFFECTS
+
+from .conftest import COMMANDS, machine_of, recorded
+
+#: a clearly visible size of each effect, and the block of rows in which it shows
+SIZES = {
+    "magnet_temperature": ({"alpha_m": -1e-3}, "electrical_a"),
+    "unit_calibration": ({"R_scale": 1.08, "k_scale": 0.96}, "electrical_a"),
+    "contact_resistance": ({"R_x_a": 0.05, "R_x_b": 0.0, "R_x_c": 0.02}, "electrical_a"),
+    "inductance_tolerance": ({"L_scale": 1.25}, "electrical_a"),
+    "inductance_saturation": ({"s": 0.05}, "electrical_a"),
+    "back_emf_shape": ({"width": 105.0, "h5": 0.02, "h7": -0.02}, "electrical_a"),
+    "dynamic_eccentricity": ({"d": 0.04, "psi": 0.6}, "electrical_a"),
+    "self_heating": ({"heating_rate": 0.333, "Rth": 3.0}, "electrical_a"),
+    "current_gain": ({"g_a": 1.02, "g_b": 0.99, "g_c": 1.0}, "sensor_current"),
+    "current_offset": ({"o_a": 0.05, "o_b": -0.02, "o_c": 0.0}, "sensor_current"),
+    "voltage_gain": ({"g_a": 1.01, "g_b": 0.99, "g_c": 1.0}, "electrical_a"),
+    "virtual_neutral": ({"on": 1.0}, "electrical_a"),
+    "speed_latency": ({"tau": 2e-3}, "sensor_speed"),
+    "speed_scale": ({"scale": 1.01}, "sensor_speed"),
+    "angle_offset": ({"offset": 3.0}, "electrical_a"),
+    "cogging": ({"a": 0.01}, "torque"),
+    "friction_level": ({"scale": 1.5}, "torque"),
+    "viscous_friction": ({"scale": 2.5}, "torque"),
+    "friction_temperature": ({"beta": -8e-3}, "torque"),
+    "stribeck": ({"a": 0.03, "w_s": 15.0}, "torque"),
+    "friction_asymmetry": ({"a": 0.12}, "torque"),
+    "load_constant": ({"T": 8.0}, "torque"),
+    "load_spring": ({"c": 120.0}, "torque"),
+    "inertia": ({"scale": 1.25}, "torque"),
+    "backlash": ({"blk": 8e-4}, "position"),
+    "compliance": ({"K": 5000.0, "C": 300.0}, "position"),
+    "bus_voltage": ({"Vdc": 45.0}, "bus"),
+    "bus_resistance": ({"R": 0.4}, "bus"),
+    "control_delay": ({"delay": 4e-4}, "control"),
+    "hall_displacement": ({"d_a": 4.0, "d_b": -3.0, "d_c": 1.0}, "commutation"),
+}
+FAULT = (0.05, 0.02, 0.07, 0.1, -0.06, 35.0)
+
+
+def internal(effect, values):
+    """Parameters as the equations take them."""
+    if effect == "dynamic_eccentricity":
+        d, psi = values["d"], values["psi"]
+        return {"d_cos": d * np.cos(psi), "d_sin": d * np.sin(psi)}
+    if effect == "stribeck":
+        return {"a": values["a"], "log_w_s": np.log(values["w_s"])}
+    if effect == "compliance":
+        return {"flexibility": 1.0 / values["K"], "C": values["C"]}
+    return values
+
+
+def mean_squares(machine, values):
+    """Equation -> mean square of the whitened residual."""
+    out = {}
+    for block in machine.blocks(values, "a.nc"):
+        rows = whiten(block.bands, block.usable, block.residual[:, None].copy())[:, 0]
+        out[block.equation] = float(np.mean(rows[block.usable] ** 2))
+    return out
+
+
+def truth(machine, recording, effects=None, fault=(0.0,) * 6):
+    """Values of every parameter at the simulated point."""
+    values = {n: p.off for n, p in machine.parameters.items()}
+    values["dT@a.nc"] = fault[5] - (recording.ambient_temperature - 20.0)
+    for name, x in zip(("Na", "Nb", "Nc", "xi_x", "xi_y"), fault[:5], strict=True):
+        values[f"{name}@a.nc"] = x
+    for effect, given in (effects or {}).items():
+        values |= {f"{effect}.{n}": x for n, x in internal(effect, given).items()}
+    return values
+
+
+@pytest.mark.parametrize("theta_0", [0.0, 2.1])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_white_at_the_simulated_point(command, theta_0):
+    recording = recorded(command, fault=FAULT, theta_0=theta_0, health="seeded")
+    machine = machine_of({"a.nc": recording})
+    found = mean_squares(machine, truth(machine, recording, fault=FAULT))
+    for equation in ("electrical_a", "electrical_b", "electrical_c", "sensor_current", "sensor_speed", "torque", "position", "bus"):
+        assert 0.75 < found[equation] < 1.2, equation  # balanced currents are less noisy than each alone
+    assert found["control"] < 1.5 and found["commutation"] < 3.0
+
+
+@pytest.mark.parametrize("effect", SIZES)
+def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
+    given, equation = SIZES[effect]
+    fault = (0.0,) * 5 + (30.0,)
+    recording = recorded("reversal", effects={effect: given}, fault=fault)
+    machine = machine_of({"a.nc": recording})
+    on = mean_squares(machine, truth(machine, recording, {effect: given}, fault))
+    off = mean_squares(machine, truth(machine, recording, {}, fault))
+    loose = {"control": 2.0, "commutation": 4.0, "bus": 1.5}
+    for name, value in on.items():
+        assert value < loose.get(name, 1.3), (name, value)
+    assert off[equation] > on[equation] + 0.01
+
+
+def test_every_effect_has_a_size_here():
+    assert set(SIZES) == set(EFFECTS) - {"speed_quantisation"}
+
+
+@pytest.mark.parametrize("effect", SIZES)
+def test_derivatives_against_differences(effect):
+    given, _ = SIZES[effect]
+    recording = recorded("reversal", effects={effect: given})
+    machine = machine_of({"a.nc": recording})
+    values = truth(machine, recording, {effect: given})
+    base = {b.equation: b for b in machine.blocks(values, "a.nc")}
+    checked = 0
+    for name in internal(effect, given):
+        full = f"{effect}.{name}"
+        step = 1e-3 * max(abs(values[full]), machine.parameters[full].sd)
+        up = {b.equation: b for b in machine.blocks({**values, full: values[full] + step}, "a.nc")}
+        down = {b.equation: b for b in machine.blocks({**values, full: values[full] - step}, "a.nc")}
+        for equation, block in base.items():
+            if full not in block.columns:
+                continue
+            difference = (up[equation].residual - down[equation].residual) / (2.0 * step)
+            column = np.broadcast_to(block.columns[full], difference.shape)
+            use = block.usable
+            a, b = column[use], difference[use]
+            if np.linalg.norm(b) < 1e-9 * np.linalg.norm(block.residual) / step:
+                continue
+            # columns are of smoothed signals, so that they are alike and not the same
+            assert a @ b / (np.linalg.norm(a) * np.linalg.norm(b)) > 0.95, (equation, name)
+            checked += 1
+    assert checked > 0
+
+
+def test_controller_gains_stand_in_the_control_equation_alone(nominal):
+    values = {n: p.off for n, p in nominal.parameters.items()}
+    for block in nominal.blocks(values, "a.nc"):
+        gains = [n for n in block.columns if n.startswith("controller.") and n.endswith("_gain")]
+        assert bool(gains) == (block.equation == "control")
