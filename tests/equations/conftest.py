@@ -23,7 +23,14 @@ COMMANDS = {
 
 
 def recorded(
-    command="parabolic", effects=None, fault=(0.0,) * 6, seed=0, actuator=ACTUATOR, interval=2e-4, theta_0=0.7, health="healthy"
+    command="parabolic",
+    effects=None,
+    fault=(0.0,) * 6,
+    seed=0,
+    actuator=ACTUATOR,
+    interval=2e-4,
+    theta_0=0.7,
+    health="healthy",
 ):
     """A recording of a unit with these effects and faults."""
     runs = make_runs(actuator, np.array([fault]), effects=effects or {}, theta_0=theta_0)

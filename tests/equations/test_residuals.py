@@ -82,7 +82,16 @@ def test_white_at_the_simulated_point(command, theta_0):
     recording = recorded(command, fault=FAULT, theta_0=theta_0, health="seeded")
     machine = machine_of({"a.nc": recording})
     found = mean_squares(machine, truth(machine, recording, fault=FAULT))
-    for equation in ("electrical_a", "electrical_b", "electrical_c", "sensor_current", "sensor_speed", "torque", "position", "bus"):
+    for equation in (
+        "electrical_a",
+        "electrical_b",
+        "electrical_c",
+        "sensor_current",
+        "sensor_speed",
+        "torque",
+        "position",
+        "bus",
+    ):
         assert 0.75 < found[equation] < 1.2, equation  # balanced currents are less noisy than each alone
     assert found["control"] < 1.5 and found["commutation"] < 3.0
 

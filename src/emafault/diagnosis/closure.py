@@ -18,7 +18,9 @@ def own(parameters: Sequence[str], recording: str) -> list[str]:
 class Ladder:
     """Confirm recordings under frozen models; each one's soak temperature and seeded fault are refitted."""
 
-    def __init__(self, machine, recordings: Sequence[str], parameters: Mapping, weights: Mapping[tuple[str, str], Weights]):
+    def __init__(
+        self, machine, recordings: Sequence[str], parameters: Mapping, weights: Mapping[tuple[str, str], Weights]
+    ):
         self.machine, self.recordings, self.parameters, self.weights = machine, list(recordings), parameters, weights
 
     def blocks(self, values: Mapping[str, float]) -> tuple[list[White], dict[str, float]]:
@@ -30,7 +32,8 @@ class Ladder:
             whites: list[White] = []
             for step in range(STEPS + 1):
                 whites = [
-                    whitened(b, self.weights.get(key_of(b)), free, False) for b in self.machine.blocks(values, recording)
+                    whitened(b, self.weights.get(key_of(b)), free, False)
+                    for b in self.machine.blocks(values, recording)
                 ]
                 if step == STEPS:
                     break
@@ -47,7 +50,10 @@ class Ladder:
     def rung(self, whites: Sequence[White], extra: Mapping[str, float] | None = None) -> tuple[float, int]:
         """Root mean square of the whitened residual and its number of rows."""
         total = sum(float(w.gram[-1, -1]) for w in whites)
-        count = sum(int((self.weights[key_of(w.block)].usable if key_of(w.block) in self.weights else w.block.usable).sum()) for w in whites)
+        count = sum(
+            int((self.weights[key_of(w.block)].usable if key_of(w.block) in self.weights else w.block.usable).sum())
+            for w in whites
+        )
         return float(np.sqrt(total / max(count, 1))), count
 
     def placebo(self, whites: Sequence[White], size: int) -> float:
@@ -59,7 +65,9 @@ class Ladder:
         rng = np.random.default_rng(20)
         base = sum(float(w.gram[-1, -1]) for w in whites)
         count = self.rung(whites)[1]
-        return float(np.median([np.sqrt((base + rng.chisquare(max(size, 1))) / max(count, 1)) for _ in range(PLACEBOS)]))
+        return float(
+            np.median([np.sqrt((base + rng.chisquare(max(size, 1))) / max(count, 1)) for _ in range(PLACEBOS)])
+        )
 
 
 def closed(recalibrated: float, after: float, floor: float, rows: int) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve
 
 from .evidence import Normal, Reduced, marginalise
-from .linear import White, Weights, assemble, correct, key_of, weights_from, whitened
+from .linear import Weights, White, assemble, correct, key_of, weights_from, whitened
 from .model import Parameter, Unit, Variant
 from .search import REMAINDER_SIZES, WIDTHS, Candidate, Model, Search
 
@@ -188,7 +188,7 @@ class Bench:
     def reweigh(self, whites: Sequence[White], normal: Normal) -> None:
         """Weights of every block from the full model's residual."""
         deviations = self.full(normal)
-        columns, aliases = self.columns()
+        _, aliases = self.columns()
         for n, alias in aliases.items():
             deviations[alias] = deviations.get(alias, 0.0) + deviations.pop(n)
         for w in whites:
@@ -206,7 +206,6 @@ class Bench:
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()
         for unit in self.units:
-            names = [p.name for v in self.active(unit) for p in v.parameters]
             if unit.id not in inside:
                 for p in unit.parameters:
                     self.point[p.name] = p.off
@@ -223,7 +222,6 @@ class Bench:
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     self.point[p.name] = self.point.get(p.name, p.off) + d
             on.add(unit.id)
-            del names
         self.on = on
         return largest
 

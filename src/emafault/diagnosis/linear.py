@@ -10,7 +10,6 @@ from .evidence import Normal
 from .model import Block
 from .whitening import OUTLIER, autoregression, whiten
 
-
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 
 
@@ -128,9 +127,9 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
             for t in of.get(n, ()):
                 source.append(k)
                 target.append(t)
-        s, t = np.array(source, int), np.array(target, int)
-        H[np.ix_(t, t)] += w.gram[np.ix_(s, s)]
-        g[t] += w.gram[s, -1]
+        rows, into = np.array(source, int), np.array(target, int)
+        H[np.ix_(into, into)] += w.gram[np.ix_(rows, rows)]
+        g[into] += w.gram[rows, -1]
         c += w.gram[-1, -1]
     return Normal(list(names), H, g, c)
 

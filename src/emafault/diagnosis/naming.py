@@ -1,13 +1,11 @@
 """From a posterior over sets to names: one rule, an inclusion probability of at least ``NAMED``.
 
-Effects whose inclusions reach it only together, one standing in for the other in the sets of the posterior, are a group.
+Effects whose inclusions reach it only together, one standing in for the other in the sets, are a group.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-
-import numpy as np
 
 from .model import Unit
 from .search import Model, posterior
@@ -35,7 +33,7 @@ class Reading:
     verdict: str
 
 
-def read(models: Sequence[Model], units: Sequence[Unit], observed: Sequence[str] = ()) -> Reading:
+def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str] = ()) -> Reading:
     """Read a posterior; effects ``observed`` for certain belong to every set."""
     kind = {u.id: u.kind for u in units}
     weights = posterior(models)
@@ -82,20 +80,10 @@ def _groups(models, weights, effects, inclusion) -> tuple[tuple[str, ...], ...]:
     used: set[str] = set()
     for size in range(2, MEMBERS + 1):
         for group in combinations(likely, size):
-            if used & set(group) or inclusion[group[0]] > 0.0 and sum(inclusion[e] for e in group) < NAMED:
+            if used & set(group) or (inclusion[group[0]] > 0.0 and sum(inclusion[e] for e in group) < NAMED):
                 continue
             one = sum(float(w) for u, w in zip(units, weights, strict=True) if len(u & set(group)) == 1)
             if one >= NAMED and min(inclusion[e] for e in group) >= 0.02:
                 out.append(tuple(sorted(group)))
                 used |= set(group)
     return tuple(out)
-
-
-def mixture(reading: Reading, most: int = 8) -> list[tuple[Model, float]]:
-    """Leading models of the likeliest sets with their masses, for averages over what is believable."""
-    chosen = [(m, p) for _, p, m in reading.sets[:most] if p > 0.01]
-    total = sum(p for _, p in chosen)
-    return [(m, p / total) for m, p in chosen] if total > 0.0 else []
-
-
-__all__ = ["NAMED", "Reading", "mixture", "np", "read"]

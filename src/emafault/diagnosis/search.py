@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import product
 
 import numpy as np
 
@@ -203,7 +202,11 @@ class Search:
             step = c.mean - d[c.index]
             A = r.M[np.ix_(c.index, c.index)] * np.outer(c.sd, c.sd) + np.eye(len(c.index))
             g = (left[c.index] - r.M[np.ix_(c.index, c.index)] @ step) * c.sd
-            gain = left[c.index] @ step - 0.5 * step @ r.M[np.ix_(c.index, c.index)] @ step + 0.5 * g @ np.linalg.solve(A, g)
+            gain = (
+                left[c.index] @ step
+                - 0.5 * step @ r.M[np.ix_(c.index, c.index)] @ step
+                + 0.5 * g @ np.linalg.solve(A, g)
+            )
             scores.append((float(gain), m))
         return [m for _, m in sorted(scores, key=lambda x: -x[0])[:most]]
 
@@ -227,6 +230,3 @@ def posterior(models: Sequence[Model]) -> np.ndarray:
     logs = np.array([m.log_posterior for m in models])
     w = np.exp(logs - logs.max())
     return w / w.sum()
-
-
-__all__ = ["Candidate", "Choice", "Model", "Search", "inclusion", "posterior", "product"]

@@ -1,4 +1,4 @@
-"""Where the gap lies: how much of what the leading model adds falls on each equation, and where along its coordinates."""
+"""Where the gap lies: how much of what the leading model adds falls on each equation, and where along it."""
 
 from collections.abc import Mapping, Sequence
 

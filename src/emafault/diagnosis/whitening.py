@@ -59,7 +59,9 @@ def _substitute(lower, usable, coefficients, scale, rows):
             rows[k, q] = rows[k, q] * scale if usable[k] else 0.0
 
 
-def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray, coefficients=(), variance: float = 1.0) -> np.ndarray:
+def whiten(
+    bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray, coefficients=(), variance: float = 1.0
+) -> np.ndarray:
     """(row, column) made white in place: divided by the Cholesky factor of the banded covariance, then by the
     autoregressive model of what a full model leaves; rows not usable become zero."""
     n = len(bands[0])
@@ -71,7 +73,7 @@ def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray, coeffi
 
 
 def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
-    """Coefficients of the autoregressive model of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
+    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
     top = min(ORDER, n // 20)

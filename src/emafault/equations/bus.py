@@ -10,11 +10,12 @@ from .terms import with_hook
 def residual(state: State) -> Dual:
     """Recorded less predicted bus voltage (V)."""
     rec = state.rec
-    out: Dual | float = 0.0
+    out = Dual(0.0)
     for m in with_hook("supply"):
         out = out + m.supply(state.p.of(effect_name(m)))
     for m in with_hook("sag"):
         out = out - m.sag(state.p.of(effect_name(m)), rec, state.bus_current)
+    assert rec.bus is not None
     return rec.bus - out
 
 

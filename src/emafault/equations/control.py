@@ -31,7 +31,9 @@ def residual(state: State) -> Dual:
     output = model + uniform_filter1d(rec.output - model, max(1, round(AVERAGED / h)), mode="nearest")
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
     seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
-    wanted = p("controller.position_gain") * (a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(output, h, lead)))
+    wanted = p("controller.position_gain") * (
+        a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(output, h, lead))
+    )
     error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
     state.at_limit = _at_limit(rec)
     # the integral rests while the demand is at its limit

@@ -11,7 +11,6 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed
 from ..diagnosis.fit import Bench, Fit
-from ..diagnosis.linear import key_of
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
@@ -88,8 +87,14 @@ def _seal(reading: Reading) -> dict[str, Any]:
     return out | {"digest": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def _verdict(name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings) -> dict[str, Any]:
-    best = reading.sets[0][2] if reading.sets and reading.named + tuple(g for q in reading.groups for g in q) else fit.models[0]
+def _verdict(
+    name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings
+) -> dict[str, Any]:
+    best = (
+        reading.sets[0][2]
+        if reading.sets and reading.named + tuple(g for q in reading.groups for g in q)
+        else fit.models[0]
+    )
     deviations = _from_off(bench, best)
     found = where(fit.whites, deviations, EQUATION)
     verdict: dict[str, Any] = {
@@ -146,7 +151,6 @@ def _parameters(bench: Bench, machine: ReferenceActuator, effects: Sequence[str]
 
 
 def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float, float]]:
-    unit = next(u for u in bench.units if u.id == effect)
     values, spread = {}, {}
     for n, d in model.deviations.items():
         if n.startswith("remainder."):
@@ -161,14 +165,17 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
                 spread[full.split(".", 1)[1]] = abs(at - off) * model.spread[n]
             continue
         short = n.split(".", 1)[1].rstrip("+")
-        base = bench.parameters[p.alias].off + (bench.point.get(p.alias, 0.0) - bench.parameters[p.alias].off) if p.alias else p.off
+        base = (
+            bench.parameters[p.alias].off + (bench.point.get(p.alias, 0.0) - bench.parameters[p.alias].off)
+            if p.alias
+            else p.off
+        )
         if p.alias:
             values[short] = base + bench.point.get(n, 0.0) + d
         else:
             values[short] = bench.point.get(n, p.off) + d
         spread[short] = model.spread[n]
     report = getattr(TERMS[effect], "report", None)
-    del unit
     if report is not None and values:
         return report(values, spread)
     return {n: (v, spread[n]) for n, v in values.items()}
@@ -177,7 +184,7 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
 def _which(bench: Bench, machine: ReferenceActuator, reading: Reading, found: Sequence[Mapping]) -> list[dict]:
     """Sets with their probabilities and parameters, the empty set and the unknown; the verdict's own first."""
     grouped = {e for g in reading.groups for e in g}
-    entries = []
+    entries: list[dict[str, Any]] = []
     for effects, p, model in reading.sets[:12]:
         inside = grouped & set(effects)
         entries.append(
@@ -187,9 +194,14 @@ def _which(bench: Bench, machine: ReferenceActuator, reading: Reading, found: Se
             }
         )  # fmt: skip
     rest = sum(p for _, p, _ in reading.sets[12:])
-    empty = {"effects": [], "probability": reading.empty, "group": None}
+    empty: dict[str, Any] = {"effects": [], "probability": reading.empty, "group": None}
     equation = _equation(reading, found)
-    unknown = {"effects": ["unknown"], "equation": equation, "probability": reading.unknown + rest, "group": None}
+    unknown: dict[str, Any] = {
+        "effects": ["unknown"],
+        "equation": equation,
+        "probability": reading.unknown + rest,
+        "group": None,
+    }
     total = sum(e["probability"] for e in (*entries, empty, unknown))
     for e in (*entries, empty, unknown):
         e["probability"] = round(float(e["probability"]) / total, 6)
@@ -226,7 +238,8 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
         channel = form.split("_", 1)[1].replace("_", " of phase ")
         out.append(
             {
-                "equation": unit.equations[0], "along": "time", "form": kind, "probability": float(reading.inclusion[form]),
+                "equation": unit.equations[0], "along": "time", "form": kind,
+                "probability": float(reading.inclusion[form]),
                 "closed": None, "another_form_of": None, "parameters": parameters, "recordings": list(bench.recordings),
                 "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
             }
@@ -236,9 +249,10 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
         out.append(
             {
                 "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
-                "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None, "parameters": {},
+                "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
+                "parameters": {},
                 "recordings": list(bench.recordings),
-                "sentence": f"The {equation.replace('_', ' ')} equation leaves more than noise that nothing listed describes.",
+                "sentence": f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further.",
             }
         )  # fmt: skip
     return out
@@ -340,6 +354,3 @@ def _shrinks(bench: Bench, held_out, best: Model, before: Mapping, recordings, v
         "after": after, "floor": 1.0, "closed": closed(recalibrated, after, 1.0, rows),
     }  # fmt: skip
     return {"signal": signal, "features": None, "fault_vector": None}
-
-
-__all__ = ["diagnose", "key_of"]

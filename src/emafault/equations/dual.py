@@ -71,7 +71,7 @@ class Dual:
         """A linear operator on arrays of ``size`` samples, a shift or a filter."""
 
         def full(x: Number) -> np.ndarray:
-            return operate(x if np.ndim(x) else np.full(size, float(x)))
+            return operate(np.asarray(x) if np.ndim(x) else np.full(size, float(x)))
 
         return Dual(full(self.value), {n: full(s) for n, s in self.slopes.items()})
 

@@ -1,7 +1,7 @@
 """v_j = R_j i_j + d(flux)/dt + e_j of each phase, means over the interval: exact for any motion within it.
 
-The mean of e_j is k_j times the integral of f over the angle swept, the mean of the flux term the difference of the flux
-between the interval's ends.
+The mean of e_j is k_j times the integral of f over the angle swept, the mean of the flux term the difference of the
+flux between the interval's ends.
 """
 
 import numpy as np

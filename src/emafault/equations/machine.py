@@ -43,10 +43,10 @@ class ReferenceActuator:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)
         for effect in EFFECTS.values():  # one left out of the library is off
-            for name, p in _internal(effect).items():
+            for name, q in _internal(effect).items():
                 full = f"{effect.id}.{name}"
                 if full not in self.parameters and effect.id not in self.effects:
-                    self.parameters[full] = Parameter(full, p.off, p.off, 0.0, p.units, fixed=True)
+                    self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
 
     # ---- parameters
     def _nuisances(self) -> dict[str, Parameter]:
@@ -68,7 +68,11 @@ class ReferenceActuator:
         out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
         full = "controller.commutation_slope"
         out[full] = Parameter(full, 4e-6, 4e-6, 1e-5, "s/A")
-        for name, sd, units in (("speed", 1e-5, "s"), ("power", 1e-5, "s/A"), *((f"time_{j}", 1e-6, "s") for j in "abc")):
+        for name, sd, units in (
+            ("speed", 1e-5, "s"),
+            ("power", 1e-5, "s/A"),
+            *((f"time_{j}", 1e-6, "s") for j in "abc"),
+        ):
             full = f"controller.commutation_{name}"
             out[full] = Parameter(full, 0.0, 0.0, sd, units)
         unknown = False
@@ -116,7 +120,7 @@ class ReferenceActuator:
         variants = [Variant(parameters, positive, least)] if not shapes else []
         for n, shape in enumerate(shapes):
             full = f"{effect.id}#{n}"
-            near = n > 0 and effect.id != "stribeck" or effect.id == "compliance"
+            near = (n > 0 and effect.id != "stribeck") or effect.id == "compliance"
             mean, sd = (1.0, 0.5) if near else (0.0, 2.0)
             parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
             variants.append(Variant([parameter], [0 if near else 1]))
@@ -143,9 +147,7 @@ class ReferenceActuator:
         out.append(Unit("~crosstalk_current", "form", ("sensor_current",), [Variant(parameters)]))
         for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
             for j in PER_PHASE:
-                parameters = [
-                    Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings
-                ]
+                parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings]
                 out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)]))
         return out
 
@@ -168,7 +170,9 @@ class ReferenceActuator:
         found = []
         for j, (name, r) in enumerate(electrical.residuals(state).items()):
             found.append((name, r, electrical.noise_bands(state, j), _not_first(rec) & electrical.usable(state, j)))
-        found.append(("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec)))
+        found.append(
+            ("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec))
+        )
         found.append(("sensor_speed", sensor_speed.residual(state), sensor_speed.noise_bands(state), _not_first(rec)))
         found.append(("torque", torque.residual(state), torque.noise_bands(state), torque.usable(state)))
         found.append(("position", position.residual(state), position.noise_bands(state), _not_first(rec)))
@@ -176,7 +180,7 @@ class ReferenceActuator:
             found.append(("bus", bus.residual(state), bus.noise_bands(state), _not_first(rec)))
         found.append(("control", control.residual(state), control.noise_bands(state), control.usable(state)))
         turning = commutation.residual(state)
-        count = len(turning.value)
+        count = np.size(turning.value)
         if count > 20:
             found.append(("commutation", turning, commutation.noise_bands(state, count), np.ones(count, bool)))
         blocks = []
@@ -184,12 +188,14 @@ class ReferenceActuator:
             columns = dict(r.slopes)
             for parameter, column in self._secants(state, name, r, values).items():
                 columns[parameter] = column
-            blocks.append(Block(rec.name, name, np.asarray(r.value), columns, bands, usable, self._coordinates(state, name)))
+            blocks.append(
+                Block(rec.name, name, np.asarray(r.value), columns, bands, usable, self._coordinates(state, name))
+            )
         return blocks
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""
-        out = {}
+        out: dict[str, np.ndarray] = {}
         reach = {"sensor_speed": sensor_speed, "torque": torque, "position": position}
         if equation not in reach:
             return out
@@ -218,8 +224,10 @@ class ReferenceActuator:
             "rotor_angle": np.mod(rec.middle, 2 * np.pi), "temperature": np.full(rec.size, rec.ambient),
         }  # fmt: skip
         phi = [
-            np.ones(rec.size), rec.direction, np.abs(w), w * w, level - 0.3, t, np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
-            np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle), np.full(rec.size, rec.dT_measured / 50.0),
+            np.ones(rec.size), rec.direction, np.abs(w), w * w, level - 0.3, t,
+            np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
+            np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle),
+            np.full(rec.size, rec.dT_measured / 50.0),
             np.exp(-np.abs(rec.speed) / 8.0), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
         ]  # fmt: skip
         drivers = [np.ones(rec.size)]

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from .dual import Dual
 from .signals import Signals
 
@@ -38,10 +40,28 @@ def effect_name(module) -> str:
 
 
 class State:
-    """What several equations share at one point of one recording: true currents, coefficients, temperatures.
+    """What several equations share at one point of one recording, derived from the recorded signals and the point.
 
-    Everything is derived from the recorded signals and the point; nothing is simulated.
+    Lists are by phase. ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
+    ``conducting`` mean of f over the part in which the phase is switched on, ``rise`` voltage of the inductance (V),
+    ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m), ``at_limit`` whether the current
+    is limited.
     """
+
+    dT: Dual
+    current: list[Dual]
+    current_end: list[Dual]
+    turns: list[Dual]
+    k: list[Dual]
+    resistance: list[Dual]
+    swept: list[Dual]
+    regressor: list[Dual]
+    conducting: list[Dual]
+    rise: list[Dual]
+    loss: np.ndarray
+    bus_current: np.ndarray
+    drive: np.ndarray
+    at_limit: np.ndarray
 
     def __init__(self, rec: Signals, point: Point):
         from . import quantities

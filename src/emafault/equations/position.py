@@ -11,7 +11,7 @@ from .terms import with_hook
 
 @compiled
 def through_play(gear, half):
-    """Angle of the shaft behind a play of half-width ``half`` (rad), and its derivative by ``half``; from its middle."""
+    """Angle of the shaft behind a play of half-width ``half`` (rad), and its derivative by ``half``."""
     out, slope = np.empty(gear.shape[0]), np.empty(gear.shape[0])
     at, by = 0.0, 0.0
     for n in range(gear.shape[0]):
@@ -26,7 +26,7 @@ def through_play(gear, half):
 def shaft_angle(state: State) -> Dual:
     """Angle of the user shaft behind the gear's play and flexibility (rad)."""
     rec = state.rec
-    play: Dual | float = 0.0
+    play = Dual(0.0)
     for m in with_hook("play"):
         play = play + m.play(state.p.of(effect_name(m)))
     value, slope = through_play(rec.turned / rec.actuator.gear_ratio, 0.5 * float(value_of(play)))

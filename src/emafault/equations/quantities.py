@@ -1,7 +1,6 @@
 """Quantities of one recording at a point that several equations need: true currents, coefficients, the shape."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from .acquisition import true_currents
 from .dual import Dual, value_of
@@ -55,7 +54,7 @@ def _angles(state: State) -> None:
 
 def _mean_shape(state: State, low, high, shift, ramp) -> Dual:
     """Integral of f from low to high (electrical rad), measured angles."""
-    off, r = value_of(shift), value_of(ramp)
+    off, r = float(value_of(shift)), float(value_of(ramp))
     F1, dr1 = trapezoid_swept(low - off, r)
     F2, dr2 = trapezoid_swept(high - off, r)
     f1, f2 = trapezoid_at(low - off, r)[0], trapezoid_at(high - off, r)[0]
@@ -98,12 +97,12 @@ def _resistances(state: State) -> None:
     base = [_product(state, "winding", rec, j) * state.turns[j] * a.resistance for j in range(3)]
     alpha = a.copper_coefficient
     ripple = a.hysteresis**2 / 3.0
-    loss = 0.0
+    loss = np.zeros(rec.size)
     warm = 1.0 + alpha * rec.dT_measured
     for j in range(3):
         i = np.asarray(value_of(state.current[j]))
         on = np.abs(i) > 0.5 * a.hysteresis
-        loss = loss + value_of(base[j]) * warm * (i * i + on * ripple)
+        loss = loss + float(value_of(base[j])) * warm * (i * i + on * ripple)
     heat = 0.0
     for m in with_hook("heating"):
         heat = heat + m.heating(p.of(effect_name(m)), rec, loss)
@@ -111,7 +110,5 @@ def _resistances(state: State) -> None:
         base[j] * (1.0 + alpha * (state.dT + heat)) + _sum(state, "resistance", rec, j) for j in range(3)
     ]
     state.loss = loss
-    # filters run along time, so the mean over the last millisecond stands for the bus current
     drive = sum((value_of(state.k[j]) * value_of(state.swept[j]) * value_of(state.current[j]) for j in range(3)), 0.0)
     state.bus_current = (loss + drive) / a.bus_voltage
-    state.lfilter = lfilter

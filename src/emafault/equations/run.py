@@ -57,10 +57,12 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
         out.append(f"One of a group that these recordings cannot tell apart: {names}.")
     if kind == "no_gap":
         p = first["probability"]
-        out.append(f"The nominal model within the unit's tolerances accounts for these recordings (probability {p:.3g}).")
+        out.append(
+            f"The nominal model within the unit's tolerances accounts for these recordings (probability {p:.3g})."
+        )
     if kind == "unknown":
         out.append(
-            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation, and no listed effect "
+            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
             f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
         )
     out += [d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"]
@@ -91,19 +93,35 @@ def _page(verdict: Mapping[str, Any]) -> Page:
         page.paragraph(sentence, "lead")
     page.heading("Residual by equation and operating region")
     rows = [
-        [w["equation"], w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}", f"{w['z']:.3g}", f"{w['share']:.1%}"]
+        [
+            w["equation"],
+            w["along"].replace("_", " "),
+            f"{w['from']:.3g} to {w['to']:.3g}",
+            f"{w['z']:.3g}",
+            f"{w['share']:.1%}",
+        ]
         for w in verdict["where"]
     ]
     page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
     page.heading("Posterior probability")
     rows = [
-        [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e) if e.get("parameters") else ""]
+        [
+            " + ".join(e["effects"]).replace("_", " ") or "no effect",
+            f"{e['probability']:.4f}",
+            _fitted(e) if e.get("parameters") else "",
+        ]
         for e in verdict["which"][:MOST]
     ]
     page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
     page.heading("Controller")
     rows = [
-        [n.replace("_", " "), f"{g['nominal']:.4g}", f"{g['value']:.4g}", f"{g['low']:.4g} to {g['high']:.4g}", g["units"]]
+        [
+            n.replace("_", " "),
+            f"{g['nominal']:.4g}",
+            f"{g['value']:.4g}",
+            f"{g['low']:.4g} to {g['high']:.4g}",
+            g["units"],
+        ]
         for n, g in verdict["controller"].items()
     ]
     page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
@@ -113,7 +131,12 @@ def _page(verdict: Mapping[str, Any]) -> Page:
         for component, after in stages["after"].items():
             before = stages["before"][component]
             rows.append(
-                [f"{name}: {component}", f"{before['value']:.4g}", f"{after['value']:.4g}", f"{after['low']:.4g} to {after['high']:.4g}"]
+                [
+                    f"{name}: {component}",
+                    f"{before['value']:.4g}",
+                    f"{after['value']:.4g}",
+                    f"{after['low']:.4g} to {after['high']:.4g}",
+                ]
             )
     page.table(["component", "nominal model recalibrated", "with what was found", "90 % interval"], rows)
     signal = verdict["shrinks"]["signal"]

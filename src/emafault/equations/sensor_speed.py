@@ -30,4 +30,7 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((rad/s)2)."""
     rec = state.rec
     angle = (rec.noise.angle / rec.interval) ** 2
-    return [np.full(rec.size, rec.noise.speed**2 + rec.speed_step**2 / 12.0 + 2.0 * angle), np.full(rec.size - 1, -angle)]
+    return [
+        np.full(rec.size, rec.noise.speed**2 + rec.speed_step**2 / 12.0 + 2.0 * angle),
+        np.full(rec.size - 1, -angle),
+    ]

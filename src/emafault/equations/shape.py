@@ -13,9 +13,7 @@ def trapezoid_swept(x: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray]
     value = np.where(
         rising, u * u / (2.0 * ramp), np.where(falling, np.pi - ramp - rest * rest / (2.0 * ramp), u - 0.5 * ramp)
     )
-    slope = np.where(
-        rising, -(u * u) / (2.0 * ramp**2), np.where(falling, -1.0 + rest * rest / (2.0 * ramp**2), -0.5)
-    )
+    slope = np.where(rising, -(u * u) / (2.0 * ramp**2), np.where(falling, -1.0 + rest * rest / (2.0 * ramp**2), -0.5))
     return value, slope
 
 

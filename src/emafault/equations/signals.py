@@ -1,7 +1,8 @@
 """One recording as the equations take it: angles at both ends of each interval, speed, direction, what is masked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -34,14 +35,14 @@ class Signals:
     ambient: float
     health: str
     noise: SensorNoise
-    masked: dict[str, np.ndarray] = field(default_factory=dict)  # channel -> (sample,) not to be used
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
         r = recording
         return cls(
             name, actuator, r.interval, r.phase_voltage, r.phase_current, r.phase_current_end, r.rotor_speed,
-            r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health, noise,
+            r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
+            noise,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -71,6 +72,7 @@ class Signals:
         self.speed_step = lattice_step(self.speed_recorded)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
+        self.dT: Any = self.dT_measured  # with its derivative once a point is known
 
     def _start_angle(self) -> float:
         moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)
@@ -102,6 +104,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
 
     The angle's is taken of the most finely sampled recordings, that of the end currents where a phase floats.
     """
+
     def robust(parts: list[np.ndarray]) -> float:
         x = np.concatenate(parts) if parts else np.zeros(0)
         return float(np.median(np.abs(x - np.median(x))) / 0.6745) if len(x) > 50 else np.inf

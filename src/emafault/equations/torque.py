@@ -10,7 +10,6 @@ from .dual import Dual
 from .point import State, effect_name
 from .terms import with_hook
 
-
 UNRESOLVED = 0.2  # of the change from interval to interval: where within one a torque changes is not recorded
 
 

@@ -15,10 +15,6 @@ from types import ModuleType
 from ...effects import EFFECTS
 
 TERMS: dict[str, ModuleType] = {id_: import_module(f"{__name__}.{id_}") for id_ in EFFECTS}
-HOOKS = (
-    "current", "angle", "ramp", "harmonics", "coefficient", "resistance", "winding", "inductance", "flux", "voltage",
-    "speed", "torque", "friction", "inertia", "viscous", "play", "twist", "shaft", "supply", "sag", "delay", "commutation",
-)  # fmt: skip
 
 
 def with_hook(hook: str) -> list[ModuleType]:

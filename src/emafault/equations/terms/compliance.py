@@ -19,7 +19,9 @@ def solve(rec, flexibility, damping, play):
     if flexibility < STIFFEST:
         return None
     J = SHARE * a.inertia * a.gear_ratio**2
-    position, torque = flexible_shaft(rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play)
+    position, torque = flexible_shaft(
+        rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
+    )
     return position, torque / a.gear_ratio - SHARE * a.inertia * rec.acceleration
 
 
