@@ -57,11 +57,16 @@ def internal(effect, values):
 
 
 def mean_squares(machine, values):
-    """Equation -> mean square of the whitened residual."""
+    """Equation -> mean square of the whitened residual; of the control equations a robust one.
+
+    At a reversal the loops' own dynamics between samples show in single rows, which a diagnosis leaves out.
+    """
     out = {}
     for block in machine.blocks(values, "a.nc"):
         rows = whiten(block.bands, block.usable, block.residual[:, None].copy())[:, 0]
-        out[block.equation] = float(np.mean(rows[block.usable] ** 2))
+        square = rows[block.usable] ** 2
+        loose = block.equation in ("control", "commutation")
+        out[block.equation] = float(np.median(square) / 0.455 if loose else np.mean(square))
     return out
 
 
@@ -107,7 +112,8 @@ def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     loose = {"control": 2.0, "commutation": 4.0, "bus": 1.5}
     for name, value in on.items():
         assert value < loose.get(name, 1.3), (name, value)
-    assert off[equation] > on[equation] + 0.01
+    rows = next(b for b in machine.blocks(truth(machine, recording), "a.nc") if b.equation == equation).usable.sum()
+    assert rows * (off[equation] - on[equation]) > 10.0
 
 
 def test_every_effect_has_a_size_here():
@@ -117,9 +123,10 @@ def test_every_effect_has_a_size_here():
 @pytest.mark.parametrize("effect", SIZES)
 def test_derivatives_against_differences(effect):
     given, _ = SIZES[effect]
-    recording = recorded("reversal", effects={effect: given})
+    fault = (0.0,) * 5 + (30.0,)
+    recording = recorded("reversal", effects={effect: given}, fault=fault)
     machine = machine_of({"a.nc": recording})
-    values = truth(machine, recording, {effect: given})
+    values = truth(machine, recording, {effect: given}, fault)
     base = {b.equation: b for b in machine.blocks(values, "a.nc")}
     checked = 0
     for name in internal(effect, given):
@@ -137,7 +144,7 @@ def test_derivatives_against_differences(effect):
             if np.linalg.norm(b) < 1e-9 * np.linalg.norm(block.residual) / step:
                 continue
             # columns are of smoothed signals, so that they are alike and not the same
-            assert a @ b / (np.linalg.norm(a) * np.linalg.norm(b)) > 0.95, (equation, name)
+            assert a @ b / (np.linalg.norm(a) * np.linalg.norm(b)) > 0.8, (equation, name)
             checked += 1
     assert checked > 0
 

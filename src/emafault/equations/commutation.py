@@ -47,7 +47,7 @@ def residual(state: State) -> Dual:
         early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
         for m in with_hook("commutation"):
             early = early + m.commutation(p.of(effect_name(m)), j)
-        stays = rec.current[rows, STAYS[j]]
+        stays, own = (np.asarray(state.current[q].value)[rows] for q in (STAYS[j], j))
         time = p("controller.commutation_time") + p("controller.commutation_slope") * np.abs(stays)
         time = time + p(f"controller.commutation_time_{'abc'[j]}")
         w = rec.actuator.back_emf * np.abs(rec.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
@@ -57,7 +57,7 @@ def residual(state: State) -> Dual:
         inside = (edge.value > low) & (edge.value < high)
         share = (high - edge) * (1.0 / width)
         share = share.kept(inside) + np.where(edge.value <= low, 1.0, 0.0)
-        out.append(rec.current[rows, j] + share * stays)
+        out.append(own + share * stays)
     names = {n for d in out for n in d.slopes}
     sizes = [len(np.atleast_1d(d.value)) for d in out]
     slopes = {

@@ -8,6 +8,7 @@ random walk out that the integral makes of the sensors' noise.
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..actuator.commands import with_corners
 from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
@@ -31,9 +32,7 @@ def residual(state: State) -> Dual:
     output = model + uniform_filter1d(rec.output - model, max(1, round(AVERAGED / h)), mode="nearest")
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
     seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
-    wanted = p("controller.position_gain") * (
-        a.gear_ratio * (_at_ticks(rec.command, h, lead) - _at_ticks(output, h, lead))
-    )
+    wanted = p("controller.position_gain") * (a.gear_ratio * (_commanded(rec, lead) - _at_ticks(output, h, lead)))
     error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
     state.at_limit = _at_limit(rec)
     # the integral rests while the demand is at its limit
@@ -59,6 +58,14 @@ def _at_limit(rec) -> np.ndarray:
 def block_length(rec) -> int:
     """Intervals in a block."""
     return max(1, round(BLOCK / rec.interval))
+
+
+def _commanded(rec, lead: float) -> np.ndarray:
+    """Command at the middle of each interval, ``lead`` s earlier, with the corners between its samples."""
+    ends = rec.interval * np.arange(1, rec.size + 1)
+    times, positions = with_corners(ends, rec.command)
+    first = rec.command[0] - (rec.command[1] - rec.command[0])
+    return np.interp(rec.time - lead, np.concatenate([[0.0], times]), np.concatenate([[first], positions]))
 
 
 def _at_ticks(x: np.ndarray, h: float, lead: float) -> np.ndarray:

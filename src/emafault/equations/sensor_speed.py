@@ -11,12 +11,11 @@ from .terms import with_hook
 def residual(state: State) -> Dual:
     """Recorded less predicted speed (rad/s).
 
-    The rate of the angle keeps coefficient one; what effects make of the speed is taken of the smoothed one, whose
-    noise is nearly independent of the residual's.
+    Its derivatives are taken of the smoothed speed, whose noise is nearly independent of the residual's.
     """
     rec = state.rec
-    change = recorded_late(state.p, "speed", seen_speed(state, Dual(rec.speed)), rec.size) - rec.speed
-    return rec.speed_recorded - rec.rate - change
+    exact, calm = (recorded_late(state.p, "speed", seen_speed(state, Dual(w)), rec.size) for w in (rec.rate, rec.speed))
+    return rec.speed_recorded - Dual(exact.value, calm.slopes)
 
 
 def seen_speed(state: State, w: Dual) -> Dual:
