@@ -12,7 +12,6 @@ from .linear import Weights, White, assemble, correct, key_of, weights_from, whi
 from .model import Parameter, Unit, Variant
 from .search import REMAINDER_SIZES, WIDTHS, Candidate, Model, Search
 
-OWN_FORM = 0.3  # of an effect's amplitude, how far its form may differ from the library's
 ROUNDS = 5
 FIRST = 2  # steps of the unit alone before the search
 STILL = 0.3  # prior standard deviations by which the point may still move

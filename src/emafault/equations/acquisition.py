@@ -7,8 +7,6 @@ from .point import Point, effect_name
 from .signals import Signals
 from .terms import with_hook
 
-LATE, EARLY = "late", "early"
-
 
 def delayed(x: np.ndarray) -> np.ndarray:
     """Change of a signal that is one interval late: the interval before less this one."""

@@ -7,7 +7,6 @@ from ..flexible import flexible_shaft
 SENTENCE = "the transmission is flexible"
 PARAMETERS = {"flexibility": (0.0, 1.5e-4, 1.2e-4), "C": (300.0, 300.0, 60.0)}
 SHAPES = ({"flexibility": 6e-5, "C": 300.0}, {"flexibility": 1.3e-4, "C": 300.0}, {"flexibility": 3e-4, "C": 300.0})
-SECANT_FROM_OFF = True
 GROUND = 2.0  # N m s/rad from the user shaft to ground
 SHARE = 0.3  # of the inertia behind the stiffness
 STIFFEST = 2e-5  # rad/(N m)
@@ -52,9 +51,3 @@ def report(value, deviation):
     """Catalogue parameters from the fitted ones: name -> (value, standard deviation)."""
     K = 1.0 / max(value["flexibility"], 1e-6)
     return {"K": (K, deviation["flexibility"] * K * K), "C": (value["C"], deviation["C"])}
-
-
-def catalogue(value):
-    """Catalogue parameters for the simulator."""
-    on = value["flexibility"] > STIFFEST
-    return {"K": 1.0 / value["flexibility"] if on else 0.0, "C": value["C"]}

@@ -20,9 +20,3 @@ def report(value, deviation):
         "d": (d, float(np.hypot(x * sx, y * sy)) / d),
         "psi": (float(np.arctan2(y, x)), min(float(np.hypot(y * sx, x * sy)) / d**2, np.pi / 1.645)),
     }
-
-
-def catalogue(value):
-    """Catalogue parameters for the simulator."""
-    x, y = value["d_cos"], value["d_sin"]
-    return {"d": float(np.hypot(x, y)), "psi": float(np.arctan2(y, x))}

@@ -19,8 +19,3 @@ def report(value, deviation):
     """Catalogue parameters from the fitted ones: name -> (value, standard deviation)."""
     w_s = float(np.exp(value["log_w_s"]))
     return {"a": (value["a"], deviation["a"]), "w_s": (w_s, w_s * deviation["log_w_s"])}
-
-
-def catalogue(value):
-    """Catalogue parameters for the simulator."""
-    return {"a": value["a"], "w_s": float(np.exp(value["log_w_s"]))}
