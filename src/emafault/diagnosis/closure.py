@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .linear import Weights, White, assemble, key_of, whitened
+from .linear import Weights, White, assemble, compressed, key_of, white_rows
 
 STEPS = 2  # of a refit of what belongs to a recording alone
 PLACEBOS = 20
@@ -32,8 +32,8 @@ class Ladder:
             whites: list[White] = []
             for step in range(STEPS + 1):
                 whites = [
-                    whitened(b, self.weights.get(key_of(b)), free, False)
-                    for b in self.machine.blocks(values, recording)
+                    compressed(b, *white_rows(b, free, False), self.weights.get(key_of(b)))
+                    for b in self.machine.blocks(values, recording, wanted=free)
                 ]
                 if step == STEPS:
                     break
@@ -50,10 +50,7 @@ class Ladder:
     def rung(self, whites: Sequence[White], extra: Mapping[str, float] | None = None) -> tuple[float, int]:
         """Root mean square of the whitened residual and its number of rows."""
         total = sum(float(w.gram[-1, -1]) for w in whites)
-        count = sum(
-            int((self.weights[key_of(w.block)].usable if key_of(w.block) in self.weights else w.block.usable).sum())
-            for w in whites
-        )
+        count = sum(w.count for w in whites)
         return float(np.sqrt(total / max(count, 1))), count
 
     def placebo(self, whites: Sequence[White], size: int) -> float:

@@ -1,19 +1,21 @@
 """The fit of a bench: linearise, search, relinearise at what leads, until it stands still."""
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve
 
 from .evidence import Normal, Reduced, marginalise
-from .linear import Weights, White, assemble, correct, key_of, weights_from, whitened
+from .forked import forked
+from .linear import Weights, White, assemble, compressed, correct, key_of, weights_from, white_rows
 from .model import Parameter, Unit, Variant
-from .search import REMAINDER_SIZES, WIDTHS, Candidate, Model, Search
+from .search import REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
 ROUNDS = 5
 FIRST = 2  # steps of the unit alone before the search
+LEAVES = 2  # times that a member of the leading set may fall at a closer look
+SETTLING = 3  # steps of a set to its own optimum
 STILL = 0.3  # prior standard deviations by which the point may still move
 
 
@@ -30,6 +32,18 @@ class Fit:
     search: Search
 
 
+@dataclass(frozen=True)
+class _Task:
+    """What is to be linearised: where, by which columns, with which equations' remainders (None: all)."""
+
+    values: dict[str, float]
+    wanted: list[str]
+    only: bool
+    remainders: set[str] | None
+    full: Mapping[str, float] | None
+    corrected: bool
+
+
 class Bench:
     """Recordings of one machine under one linearised model.
 
@@ -37,11 +51,11 @@ class Bench:
     ----------
     machine : gives ``parameters``, ``units`` and ``blocks(values, recordings)``
     recordings : names of those that are fitted
-    threads : recordings are linearised side by side
+    processes : in which recordings are linearised side by side
     """
 
-    def __init__(self, machine, recordings: Sequence[str], threads: int = 1):
-        self.machine, self.recordings, self.threads = machine, list(recordings), threads
+    def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
+        self.machine, self.recordings, self.processes = machine, list(recordings), processes
         self.parameters: dict[str, Parameter] = dict(machine.parameters)
         self.units: list[Unit] = list(machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()}
@@ -54,7 +68,12 @@ class Bench:
             for n, p in self.parameters.items()
             if n not in of_unit and not p.fixed and p.sd > 0.0 and ("@" not in n or n.split("@", 1)[1] in mine)
         ]
+        self._beyond: dict[str, list[str]] = {}
+        for n, p in self.parameters.items():
+            if p.alias is not None:
+                self._beyond.setdefault(p.alias, []).append(n)
         self.corrected = True
+        self.remainders: dict[str, Unit] = {}
 
     # ---- linearisation
     def active(self, unit: Unit) -> list[Variant]:
@@ -82,50 +101,126 @@ class Bench:
                 out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
         return out
 
-    def linearise(self, names: Sequence[str] | None = None, machine=None) -> list[White]:
-        """Whitened blocks at the present point."""
-        values = self.values()
+    def linearise(self, model: Model | None = None, full: Mapping[str, float] | None = None) -> list[White]:
+        """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
+
+        ``full`` deviations of a full model renew the weights first.
+        """
         columns, aliases = self.columns()
-        wanted = list(dict.fromkeys([*self.nuisances, *[n for n in columns if n not in aliases]]))
-        machine = machine or self.machine
+        if model is not None:
+            inside = {n for c in model.choices for n in self.names_of(c)}
+            columns = [n for n in columns if n in inside]
+        wanted = list(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
+        own = None if model is None else {u.split(":", 1)[1] for u in model.units if u.startswith("remainder:")}
+        task = _Task(self.values(), wanted, model is not None, own, full, self.corrected)
+        out = []
+        for whites, weights in self._each(task):
+            out += whites
+            self.weights |= weights
+        return out
 
-        def one(recording: str) -> list[White]:
-            out = []
-            blocks = machine.blocks(values, recording)
-            again = machine.blocks(values, recording, disturbed=True) if self.corrected else [None] * len(blocks)
-            for block, other in zip(blocks, again, strict=True):
-                block.columns = {n: c for n, c in block.columns.items() if n in wanted}
-                white = whitened(block, self.weights.get(key_of(block)), wanted, True)
-                if other is not None:
-                    correct(white, other, self.weights.get(key_of(block)))
-                out.append(white)
-            return out
+    def _each(self, task: "_Task") -> list:
+        """A task done for every recording, side by side where there are processes for it."""
+        if self.processes > 1 and len(self.recordings) > 1:
+            for name in self.recordings:
+                self.machine.prepare(name)
+            return forked(lambda name: self._compress(task, name), self.recordings, self.processes)
+        return [self._compress(task, name) for name in self.recordings]
 
-        names = names or self.recordings
-        if self.threads > 1 and len(names) > 1:
-            with ThreadPoolExecutor(self.threads) as pool:
-                found = list(pool.map(one, names))
-        else:
-            found = [one(n) for n in names]
-        return [w for part in found for w in part]
+    def _compress(self, task: "_Task", recording: str) -> tuple[list[White], dict[tuple[str, str], Weights]]:
+        only = set(task.wanted) if task.only else None
+        blocks = self.machine.blocks(task.values, recording, wanted=only)
+        again: Sequence = [None] * len(blocks)
+        if task.corrected:
+            again = self.machine.blocks(task.values, recording, disturbed=True, wanted=only)
+        out, renewed = [], {}
+        for block, other in zip(blocks, again, strict=True):
+            remainder = task.remainders is None or block.equation in task.remainders
+            names, rows = white_rows(block, task.wanted, remainder)
+            weights = self.weights.get(key_of(block))
+            if task.full is not None:
+                weights = renewed[key_of(block)] = weights_from(block, names, rows, task.full)
+            white = compressed(block, names, rows, weights)
+            if other is not None:
+                correct(white, block, other, weights)
+            out.append(white)
+        return out, renewed
 
-    def normal(self, whites: Sequence[White]) -> Normal:
-        """Normal matrix of all columns, remainders among them."""
+    def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
+        """Equation, (row,) what deviations add to each block in units of its noise, and what its rows lie along."""
+        _, aliases = self.columns()
+        wanted = list(dict.fromkeys(aliases.get(n, n) for n in deviations if not n.startswith("remainder.")))
+        out = []
+        for name in self.recordings:
+            for block in self.machine.blocks(self.values(), name, wanted=set(wanted)):
+                names, rows = white_rows(block, wanted, any(n.startswith("remainder.") for n in deviations))
+                d = np.array([deviations.get(n, 0.0) for n in names])
+                out.append((block.equation, rows[:, :-1] @ d, block.coordinates))
+        return out
+
+    def names_of(self, choice: Choice) -> list[str]:
+        """Columns of a unit's variant at the present point."""
+        if choice.unit.startswith("remainder:"):
+            return []
+        unit = next(u for u in self.units if u.id == choice.unit)
+        return [p.name for p in self.active(unit)[choice.variant].parameters]
+
+    def normal(self, whites: Sequence[White], model: Model | None = None) -> Normal:
+        """Normal matrix of all columns, or of those that a model has, remainders among them."""
         columns, aliases = self.columns()
+        if model is not None:
+            inside = {n for c in model.choices for n in self.names_of(c)}
+            columns = [n for n in columns if n in inside]
         left = list(dict.fromkeys(n for w in whites for n in w.names if n.startswith("remainder.")))
         return assemble(whites, [*self.nuisances, *columns, *left], aliases)
 
-    def _prior(self, name: str) -> tuple[float, float, float]:
+    def prior(self, name: str) -> tuple[float, float, float]:
         """Deviation of the prior's mean from the point, its standard deviation, and the deviation that is off."""
         if name.startswith("remainder."):
             return 0.0, 1.0, 0.0
         p = self.parameters[name]
         at = self.point.get(name, p.off)
-        return p.mean - at, p.sd, p.off - at
+        if p.vanishes is None:
+            return p.mean - at, p.sd, p.off - at
+        u, factor = self._factor(name)
+        if p.alias is not None:  # beyond its tolerance: a factor on its quantity's own
+            own = u / factor
+            return -u * np.log(factor), p.sd * u / own, -u * np.log(factor)
+        mean, off = p.mean - p.vanishes, p.off - p.vanishes
+        return u * np.log(mean / factor), p.sd * abs(u / mean), u * np.log(off / factor)
+
+    def _factor(self, name: str) -> tuple[float, float]:
+        """What a parameter that multiplies makes with its alias, the unit of its deviations, and its own factor."""
+        p = self.parameters[name]
+        assert p.vanishes is not None
+        own = p.alias or name
+        base = self.point.get(own, self.parameters[own].off) - p.vanishes
+        beyond = sum(self.point.get(n, 0.0) for n in self._beyond.get(own, ()))
+        if p.alias is None:
+            return base + beyond, base
+        return base + beyond, (base + beyond) / base
+
+    def after(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Values of parameters after deviations from the point."""
+        out: dict[str, float] = {}
+        for n, d in given.items():
+            if n.startswith("remainder."):
+                continue
+            p = self.parameters[n]
+            if p.vanishes is None:
+                out[n] = self.point.get(n, p.off) + d
+            elif p.alias is None:
+                u, factor = self._factor(n)
+                out[n] = p.vanishes + factor * float(np.exp(np.clip(d / u, -1.0, 1.0)))
+            else:
+                u, factor = self._factor(n)
+                own = out.get(p.alias, p.vanishes + u / factor)
+                out[n] = (own - p.vanishes) * (factor * float(np.exp(np.clip(d / u, -1.0, 1.0))) - 1.0)
+        return out
 
     def reduce(self, normal: Normal) -> Reduced:
         """The nuisances marginalised."""
-        prior = {n: self._prior(n) for n in normal.names}
+        prior = {n: self.prior(n) for n in normal.names}
         mean = np.array([prior[n][0] for n in self.nuisances])
         sd = np.array([prior[n][1] for n in self.nuisances])
         fixed = np.array([prior[n][2] for n in normal.names])
@@ -136,10 +231,10 @@ class Bench:
         index = normal.index
         n = np.array([index[x] for x in self.nuisances])
         rest = [x for x in normal.names if x not in set(self.nuisances)]
-        d = np.array([given.get(x, self._prior(x)[2]) for x in rest])
-        r = np.array([index[x] for x in rest])
-        mean = np.array([self._prior(x)[0] for x in self.nuisances])
-        sd = np.array([self._prior(x)[1] for x in self.nuisances])
+        d = np.array([given.get(x, self.prior(x)[2]) for x in rest])
+        r = np.array([index[x] for x in rest], int)
+        mean = np.array([self.prior(x)[0] for x in self.nuisances])
+        sd = np.array([self.prior(x)[1] for x in self.nuisances])
         A = normal.H[np.ix_(n, n)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
         found = cho_solve(cho_factor(A), right)
@@ -148,35 +243,35 @@ class Bench:
     # ---- candidates
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
         """Units and remainders of the present point, ready for the search."""
-        units = list(self.units)
         out: dict[tuple[str, int], Candidate] = {}
         for unit in self.units:
             for v, variant in enumerate(self.active(unit)):
                 names = [p.name for p in variant.parameters]
+                if not all(n in reduced.index for n in names):
+                    continue
                 index = np.array([reduced.index[n] for n in names])
-                prior = [self._prior(n) for n in names]
+                prior = [self.prior(n) for n in names]
                 signs = np.array(list(variant.signs) or [0] * len(names))
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
                 out[unit.id, v] = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
                 )  # fmt: skip
-        equations = dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder."))
-        for equation in equations:
+        for equation in dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder.")):
             index = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"remainder.{equation}.")])
             unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])])
-            units.append(unit)
+            self.remainders.setdefault(unit.id, unit)
             out[unit.id, 0] = Candidate(
                 index, np.zeros(len(index)), np.ones(len(index)), np.zeros(len(index), int), REMAINDER_SIZES,
                 [reduced.names[k] for k in index],
             )  # fmt: skip
-        return units, out
+        return [*self.units, *self.remainders.values()], out
 
     # ---- the full model, from which the weights come
     def full(self, normal: Normal) -> dict[str, float]:
         """Deviations with everything free under its prior: what this leaves is noise, or beyond all of the library."""
         names = normal.names
-        prior = [self._prior(n) for n in names]
+        prior = [self.prior(n) for n in names]
         mean = np.array([0.0 if n not in set(self.nuisances) else q[0] for n, q in zip(names, prior, strict=True)])
         sd = np.array([q[1] for q in prior])
         A = normal.H + np.diag(1.0 / sd**2)
@@ -184,43 +279,65 @@ class Bench:
         found = scale * solve(A * np.outer(scale, scale), scale * (mean / sd**2 - normal.g), assume_a="sym")
         return dict(zip(names, found.tolist(), strict=True))
 
-    def reweigh(self, whites: Sequence[White], normal: Normal) -> None:
-        """Weights of every block from the full model's residual."""
+    def full_values(self, normal: Normal) -> dict[str, float]:
+        """Where the full model lies: values of parameters, amounts of remainders and secants."""
         deviations = self.full(normal)
-        _, aliases = self.columns()
-        for n, alias in aliases.items():
-            deviations[alias] = deviations.get(alias, 0.0) + deviations.pop(n)
-        for w in whites:
-            self.weights[key_of(w.block)] = weights_from(w, deviations, self.weights.get(key_of(w.block)))
+        plain = {n: d for n, d in deviations.items() if not self._amount(n)}
+        return self.after(plain) | {n: d for n, d in deviations.items() if self._amount(n)}
+
+    def _amount(self, name: str) -> bool:
+        return name.startswith("remainder.") or self.parameters[name].secant is not None
+
+    def deviations_to(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Deviations of columns from the present point to values, aliases added to their quantities."""
+        out: dict[str, float] = {}
+        for n, value in values.items():
+            if self._amount(n):
+                out[n] = value
+                continue
+            p = self.parameters[n]
+            own = p.alias or n
+            if p.vanishes is None:
+                d = value - self.point.get(n, p.off)
+            else:
+                u, factor = self._factor(n)
+                base = values.get(own, self.point[own]) - p.vanishes
+                there = (base + value) / base if p.alias else value - p.vanishes
+                d = u * float(np.log(max(there / factor, 1e-3)))
+            out[own] = out.get(own, 0.0) + d
+        return out
 
     # ---- the whole
     def move(self, model: Model, normal: Normal) -> float:
         """Move the point to a model's fit; returns the largest step in prior standard deviations."""
         given = {n: d for n, d in model.deviations.items()}
         nuisance = self.nuisance_deviations(normal, given)
-        largest = 0.0
-        for n, d in nuisance.items():
-            largest = max(largest, abs(d) / self.parameters[n].sd)
-            self.point[n] += d
+        largest = max((abs(d) / self.prior(n)[1] for n, d in nuisance.items()), default=0.0)
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()
+        moved = dict(nuisance)
+        switched: list[tuple[Unit, Parameter, float]] = []
         for unit in self.units:
             if unit.id not in inside:
-                for p in unit.parameters:
-                    self.point[p.name] = p.off
                 continue
-            variant = self.active(unit)[inside[unit.id].variant]
-            for p in variant.parameters:
+            for p in self.active(unit)[inside[unit.id].variant].parameters:
                 d = given.get(p.name, 0.0)
                 if p.secant is not None:
-                    self._switch_on(unit, p, d)
+                    switched.append((unit, p, d))
                     largest = 1.0
                 else:
                     largest = max(largest, abs(d) / p.sd)
                     if unit.on is not None and unit.id in self.on and len(unit.variants) > 1:
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
-                    self.point[p.name] = self.point.get(p.name, p.off) + d
+                    moved[p.name] = d
             on.add(unit.id)
+        found = self.after(moved)
+        for unit in self.units:
+            if unit.id not in inside:
+                found |= {p.name: p.off for p in unit.parameters}
+        self.point |= found
+        for unit, p, d in switched:
+            self._switch_on(unit, p, d)
         self.on = on
         return largest
 
@@ -240,28 +357,110 @@ class Bench:
         normal = self.normal(whites)
         # the unit first: its nuisances move the point before anything is compared
         for _ in range(1 if warm else FIRST):
+            full = self.full_values(normal)
             if not warm:
                 self.move(Model((), 0.0, 0.0, {}, {}), normal)
-            self.reweigh(whites, normal)
-            whites = self.linearise()
+            whites = self.linearise(full=self.deviations_to(full))
             normal = self.normal(whites)
-        leading: tuple[str, ...] = ()
-        search = self._search(normal)
-        for _ in range(ROUNDS):
-            best = search.ranked()[0]
-            step = self.move(best, normal)
-            if best.units == leading and step < STILL:
+        # what no one has described comes last: it would take up what only a better point explains
+        whites, normal, search = self._until_still(whites, normal, FIRST, False)
+        whites, normal, search = self._until_still(whites, normal, ROUNDS)
+        for _ in range(LEAVES):
+            if not self._leave_out(search):
                 break
-            leading = best.units
-            self.reweigh(whites, normal)
             whites = self.linearise()
-            normal = self.normal(whites)
-            search = self._search(normal)
+            whites, normal, search = self._until_still(whites, self.normal(whites), ROUNDS)
         return Fit(dict(self.point), whites, self.weights, search.ranked(), search.reduced, normal, search)
 
-    def _search(self, normal: Normal) -> Search:
+    def _until_still(
+        self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
+    ) -> tuple[list[White], Normal, Search]:
+        leading: tuple[str, ...] = ()
+        search = self._search(normal, remainders)
+        for _ in range(rounds):
+            best = search.ranked()[0]
+            if best.units == leading and self._step(best, normal) < STILL:
+                break
+            leading = best.units
+            full = self.full_values(normal)
+            self.settle(best, normal)
+            whites = self.linearise(full=self.deviations_to(full))
+            normal = self.normal(whites)
+            search = self._search(normal, remainders)
+        return whites, normal, search
+
+    def _kind(self, unit: str) -> str:
+        return next((u.kind for u in self.units if u.id == unit), "remainder")
+
+    def _search(self, normal: Normal, remainders: bool = True) -> Search:
         reduced = self.reduce(normal)
         units, candidates = self.candidates(reduced)
+        if not remainders:
+            candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
         search = Search(reduced, units, candidates)
         search.run()
         return search
+
+    # ---- finalists, each at its own optimum
+    def _step(self, model: Model, normal: Normal) -> float:
+        """Largest step that a model would move the point by, which stays."""
+        kept = dict(self.point), set(self.on)
+        step = self.move(model, normal)
+        self.point, self.on = kept
+        return step
+
+    def settle(self, model: Model, normal: Normal | None = None) -> Model:
+        """A set at its own optimum, by Gauss-Newton from the present point, which moves there.
+
+        ``normal`` of a model fitted there saves the first step.
+        """
+        if normal is not None:
+            on = set(self.on)
+            if self.move(model, normal) < STILL:
+                return model
+            if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
+                # a secant points the way only: its effect finds its place before anything undescribed takes it
+                kept = tuple(c for c in model.choices if self._kind(c.unit) not in ("form", "remainder"))
+                return self.settle(Model(kept, 0.0, 0.0, {}, {}))
+        members = {c.unit: c for c in model.choices}
+        found = model
+        for _ in range(SETTLING):
+            shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
+            choices = tuple(replace(c, variant=0) if c.unit in shaped else c for c in members.values())
+            this = replace(model, choices=choices)
+            at_point = self.normal(self.linearise(this), this)
+            units, candidates = self.candidates(self.reduce(at_point))
+            search = Search(self.reduce(at_point), units, candidates)
+            width = {(c.unit, c.variant): c.width for c in choices}
+            found = search.fit(tuple(width), {m: w for m, w in width.items() if w in candidates[m].widths})
+            if self.move(found, at_point) < STILL:
+                break
+        return found
+
+    def _leave_out(self, search: Search) -> bool:
+        """Compare the leading set with those that lack one member, each at its own optimum; whether one is better.
+
+        What the linear model says of them from a point far from theirs is replaced by what it says at their own.
+        """
+        best = search.ranked()[0]
+        begun = dict(self.point), set(self.on)
+        leading = self.settle(best)
+        top = leading.log_posterior
+        better = (dict(self.point), set(self.on)), False
+        for unit in best.units:
+            if unit.startswith("remainder:"):
+                continue
+            self.point, self.on = dict(begun[0]), set(begun[1])
+            less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
+            self._switch_off(unit)
+            own = self.settle(Model(less.choices, 0.0, 0.0, {}, {}))
+            less.log_posterior = best.log_posterior + own.log_posterior - leading.log_posterior
+            if own.log_posterior > top:
+                top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
+        self.point, self.on = better[0]
+        return better[1]
+
+    def _switch_off(self, unit: str) -> None:
+        for p in next(u for u in self.units if u.id == unit).parameters:
+            self.point[p.name] = p.off
+        self.on.discard(unit)

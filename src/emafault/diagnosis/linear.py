@@ -1,14 +1,13 @@
 """Blocks of rows made white and compressed to normal matrices, one a recording and equation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from .evidence import Normal
 from .model import Block
-from .whitening import OUTLIER, autoregression, whiten
+from .whitening import OUTLIER, autoregression, filtered, whiten
 
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 
@@ -24,15 +23,21 @@ class Weights:
 
 @dataclass
 class White:
-    """A whitened block: ``rows`` (row, column) with the residual last, its columns' names, and what it lies along."""
+    """A block made white and compressed: its columns' ``names`` and normal matrix ``gram``, the residual last.
 
-    block: Block
+    ``own`` is what a second draw of the noise changes the residual by, squared: the noise's part of the misfit;
+    ``count`` the number of rows used.
+    """
+
+    recording: str
+    equation: str
     names: list[str]
-    rows: np.ndarray
-    gram: np.ndarray  # (column, column), the residual last
+    gram: np.ndarray
+    count: int
+    own: float = 0.0
 
 
-def key_of(block: Block) -> tuple[str, str]:
+def key_of(block: Block | White) -> tuple[str, str]:
     """What a block is called."""
     return block.recording, block.equation
 
@@ -52,12 +57,13 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
     return names, columns
 
 
-def whitened(block: Block, weights: Weights | None, wanted: Sequence[str], remainders: bool) -> White:
-    """A block's columns ``wanted`` that act in it, with its remainder's, and its residual, white and compressed."""
+def white_rows(block: Block, wanted: Sequence[str], remainder: bool) -> tuple[list[str], np.ndarray]:
+    """A block's columns ``wanted`` that act in it, with its remainder's, and its residual last: names without that of
+    the residual, and (row, column) divided by the noise's covariance."""
     names = [n for n in wanted if n in block.columns]
     count = len(block.residual)
     columns = [np.broadcast_to(block.columns[n], count) for n in names]
-    if remainders:
+    if remainder:
         size = float(np.sqrt(np.median(block.bands[0])))
         more, extra = remainder_columns(block, size)
         names, columns = names + more, columns + extra
@@ -65,39 +71,41 @@ def whitened(block: Block, weights: Weights | None, wanted: Sequence[str], remai
     for k, c in enumerate(columns):
         raw[:, k] = c
     raw[:, -1] = block.residual
-    usable = block.usable if weights is None else weights.usable
-    rows = _white(block, weights, usable, raw)
-    return White(block, names, rows, rows.T @ rows)
+    return names, whiten(block.bands, block.usable, raw)
 
 
-def _white(block: Block, weights: Weights | None, usable: np.ndarray, raw: np.ndarray) -> np.ndarray:
-    if weights is None:
-        return whiten(block.bands, usable, raw)
-    return whiten(block.bands, usable, raw, weights.coefficients, weights.variance)
+def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weights | None) -> White:
+    """Normal matrix of a block's white rows under its weights."""
+    weighed = _weighed(rows, weights)
+    used = block.usable if weights is None else weights.usable
+    return White(block.recording, block.equation, names, weighed.T @ weighed, int(used.sum()))
 
 
-def correct(white: White, disturbed: Block, weights: Weights | None) -> None:
+def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
+    return rows if weights is None else filtered(rows, weights.usable, weights.coefficients, weights.variance)
+
+
+def correct(white: White, block: Block, disturbed: Block, weights: Weights | None) -> None:
     """Take out of a normal matrix what the noise in the regressors adds to it, in place.
 
     To the first order a second draw of the noise changes the columns and the residual as the first did; the products
     of these changes with one another are what noise adds on average (Fuller 1987, Measurement Error Models, section
     2.2).
     """
-    block = white.block
     raw = np.zeros((len(block.residual), len(white.names) + 1))
     for k, n in enumerate(white.names):
         if n in block.columns:
             raw[:, k] = disturbed.columns.get(n, 0.0) - block.columns[n]
     raw[:, -1] = disturbed.residual - block.residual
     changed = [k for k in range(raw.shape[1]) if np.any(raw[:, k])]
-    usable = block.usable if weights is None else weights.usable
-    rows = _white(block, weights, usable, np.ascontiguousarray(raw[:, changed]))
+    rows = _weighed(whiten(block.bands, block.usable, np.ascontiguousarray(raw[:, changed])), weights)
     noise = (rows**2).sum(axis=0)
     power = np.diag(white.gram)[changed]
     most = np.where(np.array(changed) == raw.shape[1] - 1, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
     rows *= np.minimum(1.0, most)
     own = white.gram[-1, -1]  # the same for all hypotheses
     white.gram[np.ix_(changed, changed)] -= rows.T @ rows
+    white.own = own - float(white.gram[-1, -1])
     white.gram[-1, -1] = own
     white.gram = _definite(white.gram)
 
@@ -130,25 +138,19 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         rows, into = np.array(source, int), np.array(target, int)
         H[np.ix_(into, into)] += w.gram[np.ix_(rows, rows)]
         g[into] += w.gram[rows, -1]
-        c += w.gram[-1, -1]
+        c += w.gram[-1, -1] - w.own
     return Normal(list(names), H, g, c)
 
 
-def weights_from(white: White, deviations: dict[str, float], before: Weights | None) -> Weights:
-    """Weights of a block from what a full model's deviations leave of it; common to all hypotheses compared."""
-    block = white.block
-    usable = block.usable if before is None else before.usable
-    d = np.array([deviations.get(n, 0.0) for n in white.names])
-    left = white.rows[:, :-1] @ d + white.rows[:, -1]
-    if before is not None:  # as the banded covariance alone leaves it
-        filtered = np.concatenate([[1.0], -before.coefficients])
-        left = lfilter([1.0], filtered, left * np.sqrt(before.variance))
+def weights_from(block: Block, names: Sequence[str], rows: np.ndarray, deviations: Mapping[str, float]) -> Weights:
+    """Weights of a block from what a full model's deviations leave of its white rows; common to all hypotheses."""
+    usable = block.usable
     if usable.sum() < 30:
         return Weights(np.zeros_like(usable), np.zeros(0), 1.0)
+    left = rows[:, :-1] @ np.array([deviations.get(n, 0.0) for n in names]) + rows[:, -1]
     scale = np.median(np.abs(left[usable])) / 0.6745
     out = usable & (np.abs(left) > OUTLIER * max(scale, 1e-12))
-    spread = out | np.roll(out, 1)
-    keep = usable & ~spread
+    keep = usable & ~(out | np.roll(out, 1))
     if keep.sum() < 0.5 * usable.sum():
         keep = usable
     coefficients, variance = autoregression(np.where(keep, left, 0.0), keep)

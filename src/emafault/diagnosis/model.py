@@ -8,7 +8,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter: value at which it does nothing, prior mean and standard deviation where it is free."""
+    """One parameter: value at which it does nothing, prior mean and standard deviation where it is free.
+
+    A parameter that multiplies (``vanishes``: where its factor is zero) deviates in the logarithm of its factor, so that
+    a product of two keeps its value along the line on which one makes up for the other.
+    """
 
     name: str
     off: float
@@ -18,6 +22,7 @@ class Parameter:
     alias: str | None = None  # a nuisance whose column this one is: the same quantity beyond its tolerance
     secant: Mapping[str, float] | None = None  # values at which a secant stands for a derivative
     fixed: bool = False
+    vanishes: float | None = None
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -14,8 +15,8 @@ REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
 BEAM = 4
-ADDED = 30  # units tried in addition to a set
-SWAPPED = 8  # units tried in the place of each member
+ADDED = 15  # units tried in addition to a set
+SWAPPED = 5  # units tried in the place of each member
 NEAR = 12.0  # log posterior within which a set is worth extending
 
 
@@ -67,6 +68,9 @@ class Search:
         self.candidates = candidates
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
         self.tempering = 1.0
+        every = [u.kind for u in units]
+        listed = sum(k in ("structural", "calibration") for k in every)
+        self.counts = listed, every.count("form"), every.count("remainder")
 
     # ---- one set
     def fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None = None) -> Model:
@@ -116,8 +120,8 @@ class Search:
         return best, width
 
     def variants(self, unit: str) -> int:
-        """Number of variants of a unit."""
-        return sum(1 for u, _ in self.candidates if u == unit)
+        """Number of variants of a unit, wherever the point is."""
+        return max(1, len(self.units[unit].variants))
 
     def _evidence(self, members, width):
         index, mean, sd, signs = [], [], [], []
@@ -141,9 +145,7 @@ class Search:
         kinds = [self.units[u].kind for u, _ in members]
         listed = sum(k in ("structural", "calibration") for k in kinds)
         forms, left = kinds.count("form"), kinds.count("remainder")
-        every = [u.kind for u in self.units.values()]
-        n_listed = sum(k in ("structural", "calibration") for k in every)
-        n_forms, n_left = every.count("form"), every.count("remainder")
+        n_listed, n_forms, n_left = self.counts
         if listed >= len(SIZE_PRIOR) or forms >= len(FORM_PRIOR):
             return -np.inf
         value = np.log(SIZE_PRIOR[listed]) - _log_choose(n_listed, listed)
@@ -211,6 +213,7 @@ class Search:
         return [m for _, m in sorted(scores, key=lambda x: -x[0])[:most]]
 
 
+@cache
 def _log_choose(n: int, k: int) -> float:
     return float(np.sum(np.log(np.arange(n - k + 1, n + 1)))) - float(np.sum(np.log(np.arange(1, k + 1))))
 

@@ -4,35 +4,27 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .linear import White
-
 BINS = 6
 ALONG = ("rotor_speed", "current", "rotor_angle", "time", "direction", "temperature")
 SHOWN = 12
 ADJACENT = 0.6  # of an equation's signal that a stretch must hold to be told apart from the whole
 
 
-def signal(white: White, deviations: Mapping[str, float]) -> np.ndarray:
-    """(row,) what the deviations of a model's own parameters add to a block, in units of its noise."""
-    d = np.array([deviations.get(n, 0.0) for n in white.names])
-    return white.rows[:, :-1] @ d
-
-
-def where(whites: Sequence[White], deviations: Mapping[str, float], names: Mapping[str, str]) -> list[dict]:
+def where(signals: Sequence[tuple[str, np.ndarray, Mapping]], names: Mapping[str, str]) -> list[dict]:
     """Regions by equation and coordinate with the signal that lies there.
 
     Parameters
     ----------
-    deviations : of the leading model's own parameters, from off
+    signals : equation, (row,) what the leading model's own parameters add in units of the noise, coordinates
     names : equation of a block -> equation of the verdict
 
     Returns
     -------
     ``equation``, ``along``, ``from``, ``to``, ``z`` (root of the sum of squares, in units of the noise), ``share``
     """
-    parts: dict[str, list[tuple[White, np.ndarray]]] = {}
-    for w in whites:
-        parts.setdefault(names.get(w.block.equation, w.block.equation), []).append((w, signal(w, deviations) ** 2))
+    parts: dict[str, list[tuple[Mapping, np.ndarray]]] = {}
+    for equation, signal, coordinates in signals:
+        parts.setdefault(names.get(equation, equation), []).append((coordinates, signal**2))
     total = sum(float(s.sum()) for rows in parts.values() for _, s in rows)
     if total <= 0.0:
         return []
@@ -43,7 +35,7 @@ def where(whites: Sequence[White], deviations: Mapping[str, float], names: Mappi
             continue
         best: dict | None = None
         for along in ALONG:
-            x = np.concatenate([w.block.coordinates[along] for w, _ in rows])
+            x = np.concatenate([c[along] for c, _ in rows])
             entry = _concentrated(equation, along, x, power, total)
             if entry is not None and (best is None or entry.pop("sharpness") > best["sharpness"]):
                 sharp = _sharpness(x, power)

@@ -7,6 +7,8 @@ from ..actuator.compiled import compiled
 LEFT_OUT = 1e8  # times a row's variance where it is not used
 OUTLIER = 5.5  # standard deviations of a full model's residual
 ORDER = 12  # largest order of the autoregressive model of what is left
+LAGS = 48  # of its spectrum's estimate
+GRID = 128  # frequencies at which it is looked at
 
 
 @compiled
@@ -31,11 +33,9 @@ def _factor(bands, usable):
 
 
 @compiled
-def _substitute(lower, usable, coefficients, scale, rows):
-    """Forward substitution, then the autoregressive filter, row by row in place; rows not used become zero."""
+def _substitute(lower, usable, rows):
+    """Forward substitution, row by row in place; rows not used become zero."""
     n, m = rows.shape
-    order = len(coefficients)
-    before = np.zeros((order + 1, m))  # of the rows before, as the substitution left them
     one, two = np.zeros(m), np.zeros(m)
     for k in range(n):
         a, b, c = 1.0 / lower[0, k], lower[1, k], lower[2, k]
@@ -44,32 +44,55 @@ def _substitute(lower, usable, coefficients, scale, rows):
             two[q] = one[q]
             one[q] = x
             rows[k, q] = x if usable[k] else 0.0
-        if order > 0:
-            slot = k % (order + 1)
-            for q in range(m):
-                before[slot, q] = rows[k, q]
-            for p in range(order):
-                if k - 1 - p < 0:
-                    break
-                past = (k - 1 - p) % (order + 1)
+
+
+@compiled
+def _filter(rows, keep, coefficients, scale):
+    """The autoregressive filter; rows left out count as zero before it and after it."""
+    n, m = rows.shape
+    out = np.zeros((n, m))
+    for k in range(n):
+        if not keep[k]:
+            continue
+        for q in range(m):
+            out[k, q] = rows[k, q]
+        for p in range(min(len(coefficients), k)):
+            if keep[k - 1 - p]:
                 f = coefficients[p]
                 for q in range(m):
-                    rows[k, q] -= f * before[past, q]
+                    out[k, q] -= f * rows[k - 1 - p, q]
         for q in range(m):
-            rows[k, q] = rows[k, q] * scale if usable[k] else 0.0
+            out[k, q] *= scale
+    return out
 
 
-def whiten(
-    bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray, coefficients=(), variance: float = 1.0
-) -> np.ndarray:
-    """(row, column) made white in place: divided by the Cholesky factor of the banded covariance, then by the
-    autoregressive model of what a full model leaves; rows not usable become zero."""
+def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(row, column) divided in place by the Cholesky factor of the banded covariance; rows not usable become zero."""
     n = len(bands[0])
     full = np.zeros((3, n))
     for k, band in enumerate(bands):
         full[k, : n - k] = band
-    _substitute(_factor(full, usable), usable, np.asarray(coefficients, float), 1.0 / np.sqrt(variance), rows)
+    _substitute(_factor(full, usable), usable, rows)
     return rows
+
+
+def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, variance: float) -> np.ndarray:
+    """(row, column) through the autoregressive model of what a full model leaves; rows not kept become zero."""
+    return _filter(rows, keep, np.asarray(coefficients, float), 1.0 / np.sqrt(variance))
+
+
+def _without_dips(r: np.ndarray) -> np.ndarray:
+    """Autocovariances (lag,) of a spectrum that is nowhere below its median.
+
+    A model that fits, or a difference that is none, digs holes into the spectrum of what is left; taken for noise that is
+    quieter there, they would make a bias at these frequencies look significant.
+    """
+    k = np.arange(len(r))
+    w = (np.arange(GRID) + 0.5) * np.pi / GRID
+    cosine = np.cos(np.outer(w, k[1:]))
+    spectrum = r[0] + 2.0 * cosine @ (r[1:] * (1.0 - k[1:] / len(r)))
+    spectrum = np.maximum(spectrum, np.median(spectrum))
+    return np.concatenate([[spectrum.mean()], spectrum @ cosine / GRID])
 
 
 def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
@@ -77,9 +100,11 @@ def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
     top = min(ORDER, n // 20)
-    r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(top + 1)])
+    lags = min(LAGS, n // 4)
+    r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(lags + 1)])
     if r[0] <= 0.0:
         return np.zeros(0), 1.0
+    r = _without_dips(r)
     best, chosen, variance = n * np.log(r[0]), np.zeros(0), r[0]
     a, error = np.zeros(0), r[0]
     for order in range(1, top + 1):  # Levinson-Durbin

@@ -33,7 +33,7 @@ def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
     if early.slopes or early.value:
         out = out + early * x.linear(advanced, size)
     skew = p(f"skew.{channel}@{p.recording}")
-    if skew.slopes:
+    if skew.slopes or skew.value:
         out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
     return out
 
@@ -48,7 +48,7 @@ def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:
     if early.slopes or early.value:
         out = out + early * delayed(plain)
     skew = p(f"skew.{channel}@{p.recording}")
-    if skew.slopes:
+    if skew.slopes or skew.value:
         out = out + skew * (0.5 * (advanced(plain) - delayed(plain)))
     return out
 

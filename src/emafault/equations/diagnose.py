@@ -38,6 +38,7 @@ def diagnose(
     actuator: ActuatorParameters,
     noise: SensorNoise,
     exclude: Sequence[str] = (),
+    processes: int = 1,
 ) -> dict[str, Any]:
     """The verdict on a bench, in the format of ``diagnosis.json``.
 
@@ -47,6 +48,7 @@ def diagnose(
     split : names of those that explore and of those that confirm
     noise : of the sensors, where the recordings do not tell it
     exclude : effects that the library is to lack
+    processes : in which recordings are linearised side by side
 
     Raises
     ------
@@ -58,7 +60,7 @@ def diagnose(
     explore, confirm = split
     own = estimated_noise([recordings[n] for n in explore], noise)
     machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, exclude)
-    bench = Bench(machine, list(explore))
+    bench = Bench(machine, list(explore), processes)
     fit = bench.fit()
     reading = read(fit.models, fit.search.units.values(), tuple(machine.observed()))
     sealed = _seal(reading)
@@ -67,7 +69,7 @@ def diagnose(
     # from here on the confirm recordings are open
     own = estimated_noise(list(recordings.values()), noise)
     whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
-    every = Bench(whole, list(recordings))
+    every = Bench(whole, list(recordings), processes)
     begun = every.point | {n: v for n, v in bench.point.items() if n in every.point}
     every.point, every.on = begun, set(bench.on)
     all_fit = every.fit(warm=True)
@@ -96,7 +98,7 @@ def _verdict(
         else fit.models[0]
     )
     deviations = _from_off(bench, best)
-    found = where(fit.whites, deviations, EQUATION)
+    found = where(bench.signals(deviations), EQUATION)
     verdict: dict[str, Any] = {
         "bench": name, "schema": SCHEMA, "twin": "actuator", "verdict": reading.verdict, "sealed": sealed,
         "before_confirm": sealed["verdict"], "digest": sealed["digest"],
@@ -128,8 +130,7 @@ def _from_off(bench: Bench, model: Model) -> dict[str, float]:
             out[n] = d
             continue
         p = bench.parameters[n]
-        value = bench.point.get(n, p.off) + d - p.off
-        out[p.alias or n] = out.get(p.alias or n, 0.0) + value
+        out[p.alias or n] = out.get(p.alias or n, 0.0) + d - bench.prior(n)[2]
     return out
 
 
@@ -165,15 +166,7 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
                 spread[full.split(".", 1)[1]] = abs(at - off) * model.spread[n]
             continue
         short = n.split(".", 1)[1].rstrip("+")
-        base = (
-            bench.parameters[p.alias].off + (bench.point.get(p.alias, 0.0) - bench.parameters[p.alias].off)
-            if p.alias
-            else p.off
-        )
-        if p.alias:
-            values[short] = base + bench.point.get(n, 0.0) + d
-        else:
-            values[short] = bench.point.get(n, p.off) + d
+        values[short] = bench.after({n: d})[n] + (bench.point[p.alias] if p.alias else 0.0)
         spread[short] = model.spread[n]
     report = getattr(TERMS[effect], "report", None)
     if report is not None and values:
@@ -232,7 +225,7 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
         for n in model.deviations:
             if any(n == p.name for p in unit.parameters):
                 p = bench.parameters[n]
-                value = bench.point.get(n, p.off) + model.deviations[n]
+                value = bench.after({n: model.deviations[n]})[n]
                 sd = model.spread[n]
                 parameters[n] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": p.units}
         channel = form.split("_", 1)[1].replace("_", " of phase ")
@@ -276,7 +269,7 @@ def _controller(bench: Bench, fit: Fit) -> dict[str, dict]:
 
 def _null_point(bench: Bench) -> dict[str, float]:
     """The recalibrated nominal model: the nuisances alone, on the same recordings."""
-    null = Bench(bench.machine, bench.recordings, bench.threads)
+    null = Bench(bench.machine, bench.recordings, bench.processes)
     null.weights = bench.weights
     for _ in range(2):
         normal = null.normal(null.linearise())
@@ -297,7 +290,7 @@ def _spreads(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     """Posterior standard deviations of the nuisances with a model's own parameters free."""
     names = [*bench.nuisances, *(n for n in model.deviations if not n.startswith("remainder."))]
     k = np.array([fit.normal.index[n] for n in names])
-    sd = np.array([bench._prior(n)[1] for n in names])
+    sd = np.array([bench.prior(n)[1] for n in names])
     A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
     return dict(zip(names, (np.sqrt(np.diag(np.linalg.inv(A))) * sd).tolist(), strict=True))
 

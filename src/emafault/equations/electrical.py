@@ -5,13 +5,15 @@ flux between the interval's ends.
 """
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from .acquisition import recorded_late
-from .commutation import rows_of
+from .commutation import EDGE, REACH, rows_of
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
 
+BESIDE = 2  # intervals in which a current may fade after its phase is switched off
 NAMES = ("electrical_a", "electrical_b", "electrical_c")
 
 
@@ -74,13 +76,28 @@ def usable(state: State, j: int) -> np.ndarray:
     return out
 
 
+def switched_on(state: State, j: int) -> np.ndarray:
+    """(sample,) where phase j conducts at any time of an interval or of the ``BESIDE`` next to it on either side."""
+    rec = state.rec.rows_from
+    x = np.mod(rec.actuator.pole_pairs * rec.middle - rec.axis[j], np.pi)
+    reach = EDGE - REACH - rec.actuator.pole_pairs * np.abs(rec.half_sweep)
+    return binary_dilation((x > reach) & (x < np.pi - reach), iterations=BESIDE)
+
+
 def noise_bands(state: State, j: int) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (V2): white, and that of differenced end currents and angles."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
     white = s.voltage**2 + (a.resistance * s.current) ** 2
-    end = s.current_end if rec.current_end is not None else a.hysteresis / np.sqrt(3.0)
     f = np.asarray(value_of(state.conducting[j]))
     angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
-    differenced = (a.inductance / rec.interval * end) ** 2 + angle
+    if rec.current_end is None:  # the mean of two neighbours is off by the ripple, and by a sixth of the curvature
+        i = rec.current[:, j]
+        bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:]))
+        bend = np.maximum(bend, np.concatenate([bend[:1], bend[:-1]])) / 6.0
+        on = switched_on(state, j)
+        white = white + 2.0 * (a.inductance / rec.interval) ** 2 * (on * a.hysteresis**2 / 3.0 + bend**2)
+        differenced = angle
+    else:
+        differenced = (a.inductance / rec.interval * s.current_end) ** 2 + angle
     before = np.concatenate([differenced[:1], differenced[:-1]])
     return [white + differenced + before, -differenced[:-1]]

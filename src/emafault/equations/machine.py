@@ -1,6 +1,6 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class ReferenceActuator:
         self.actuator = actuator
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
+        self._along: dict[tuple[str, str], dict[str, np.ndarray]] = {}
         self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
         self.parameters = self._nuisances()
         self.units = [self._unit(e) for e in self.effects.values() if e.id != "speed_quantisation"]
@@ -57,7 +58,9 @@ class ReferenceActuator:
                 if p.tolerance > 0.0:
                     centre = getattr(a, p.follows) if p.follows else p.nominal
                     full = f"{effect.id}.{name}"
-                    out[full] = Parameter(full, centre, centre, p.tolerance * abs(centre), p.units)
+                    out[full] = Parameter(
+                        full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
+                    )
         for name in ("position_gain", "speed_gain", "speed_integral_gain"):
             at = getattr(a, name)
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
@@ -108,12 +111,14 @@ class ReferenceActuator:
                 full = f"{effect.id}.{name}"
                 base = self.parameters[full]
                 width = _width(p.nominal, p.low, p.high) * (base.off / p.nominal)
-                parameters.append(Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full))
+                parameters.append(
+                    Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off))
+                )
             return Unit(effect.id, "calibration", effect.equations, [Variant(parameters)])
         internal = _internal(effect)
         for name, q in internal.items():
             full = f"{effect.id}.{name}"
-            parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units))
+            parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units, vanishes=_vanishes(q.off)))
             positive.append(_sign(effect, name))
         shapes = getattr(module, "SHAPES", ())
         least = max((0.5 * _nearest(effect, n) / q.sd for n, q in internal.items()), default=0.0)
@@ -152,8 +157,16 @@ class ReferenceActuator:
         return out
 
     # ---- equations
-    def blocks(self, values: Mapping[str, float], name: str, disturbed: bool = False) -> list[Block]:
-        """Residuals of every equation of a recording, with columns by every parameter.
+    def prepare(self, name: str) -> None:
+        """Compute once what does not depend on the point."""
+        if name not in self._disturbed:
+            self._disturbed[name] = self.recordings[name].disturbed(1)
+            self.blocks({n: p.off for n, p in self.parameters.items()}, name, wanted=())
+
+    def blocks(
+        self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
+    ) -> list[Block]:
+        """Residuals of every equation of a recording, with columns by every parameter, or by those ``wanted``.
 
         ``disturbed`` takes the recording with one more draw of the sensors' noise.
         """
@@ -162,10 +175,10 @@ class ReferenceActuator:
             if name not in self._disturbed:
                 self._disturbed[name] = rec.disturbed(1)
             rec = self._disturbed[name]
-        return self._recording(values, rec)
+        return self._recording(values, rec, wanted)
 
-    def _recording(self, values: Mapping[str, float], rec: Signals) -> list[Block]:
-        point = Point(values, rec.name)
+    def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
+        point = Point(values, rec.name, wanted)
         state = State(rec, point)
         found = []
         for j, (name, r) in enumerate(electrical.residuals(state).items()):
@@ -204,15 +217,24 @@ class ReferenceActuator:
                 for p in variant.parameters:
                     if p.secant is None or not _acts(unit, equation):
                         continue
+                    if state.p.wanted is not None and p.name not in state.p.wanted:
+                        continue
                     if any(values[n] != self.parameters[n].off for n in p.secant):
                         continue  # at a point where the effect is on, its own derivatives serve
                     kept = state.p
-                    state.p = Point({**values, **p.secant}, state.rec.name)
+                    state.p = Point({**values, **p.secant}, state.rec.name, ())
                     out[p.name] = np.asarray(reach[equation].residual(state).value) - np.asarray(r.value)
                     state.p = kept
         return out
 
     def _coordinates(self, state: State, equation: str) -> dict[str, np.ndarray]:
+        """What the rows of an equation lie along, and a remainder's drivers; at the first point, as these hardly move."""
+        key = state.rec.name, equation
+        if key not in self._along:
+            self._along[key] = self._new_coordinates(state, equation)
+        return self._along[key]
+
+    def _new_coordinates(self, state: State, equation: str) -> dict[str, np.ndarray]:
         """What the rows of an equation lie along, and the drivers that a coefficient would multiply; (row,) each."""
         rec = state.rec
         w = rec.speed / 100.0
@@ -273,7 +295,14 @@ def _not_first(rec: Signals) -> np.ndarray:
 
 def _fault(full: str, component: str) -> Parameter:
     turns = component.startswith("N")
-    return Parameter(full, 0.0, 0.03 if turns else 0.0, 0.05 if turns else 0.1, "1")
+    if turns:  # the winding's turns are what is left of them
+        return Parameter(full, 0.0, 0.03, 0.05, "1", vanishes=1.0)
+    return Parameter(full, 0.0, 0.0, 0.1, "1")
+
+
+def _vanishes(off: float) -> float | None:
+    """Zero, where a parameter multiplies: one that is not zero when it is off."""
+    return 0.0 if off != 0.0 else None
 
 
 def _nearest(effect: Effect, name: str) -> float:

@@ -1,6 +1,6 @@
 """A parameter point as the equations take it: values by name, differentiated by those that a recording knows."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -12,12 +12,13 @@ class Point:
     """Parameter values at which the equations of one recording are linearised.
 
     ``values`` holds full names: ``effect.parameter``, ``fault component``, ``quantity@recording``. A name that a
-    recording does not know is off and has no derivative.
+    recording does not know is off and has no derivative. Only those ``wanted`` have derivatives (None: all).
     """
 
-    def __init__(self, values: Mapping[str, float], recording: str):
+    def __init__(self, values: Mapping[str, float], recording: str, wanted: Collection[str] | None = None):
         self.values = values
         self.recording = recording
+        self.wanted = wanted
 
     def own(self, name: str) -> Dual:
         """A parameter of this recording alone where there is one, else the bench's."""
@@ -27,6 +28,8 @@ class Point:
     def __call__(self, name: str) -> Dual:
         if name not in self.values:
             return Dual(0.0)
+        if self.wanted is not None and name not in self.wanted:
+            return Dual(self.values[name])
         return Dual(self.values[name], {name: 1.0})
 
     def of(self, effect: str) -> Callable[[str], Dual]:

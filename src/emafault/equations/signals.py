@@ -119,9 +119,9 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             off = np.abs(r.phase_current[:, j]) < 4.0 * current
             still = off & np.roll(off, 1) & np.roll(off, -1)
             if r.phase_current_end is not None and still.sum() > 20:
-                x = r.phase_current_end[still, j]
-                ends.append(x - np.median(x))
-    limits = {"angle": angle, "current": current, "current_end": robust(ends)}
+                x = r.phase_current_end[:, j] - r.phase_current_end.mean(axis=1)
+                ends.append(x[still] - np.median(x[still]))
+    limits = {"angle": angle, "current": current, "current_end": robust(ends) / np.sqrt(2.0 / 3.0)}
     return replace(
         nominal,
         **{

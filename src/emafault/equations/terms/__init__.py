@@ -9,6 +9,7 @@ A file defines the hooks it needs, each a term of one equation written for ``Dua
 The parameters are those of ``conf/effect/<id>.yaml`` unless ``PARAMETERS`` names others.
 """
 
+from functools import cache
 from importlib import import_module
 from types import ModuleType
 
@@ -17,6 +18,7 @@ from ...effects import EFFECTS
 TERMS: dict[str, ModuleType] = {id_: import_module(f"{__name__}.{id_}") for id_ in EFFECTS}
 
 
+@cache
 def with_hook(hook: str) -> list[ModuleType]:
     """Effects that have a term of this kind, in the catalogue's order."""
     return [m for m in TERMS.values() if hasattr(m, hook)]
