@@ -4,17 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve
+from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal, Reduced, marginalise
 from .forked import forked
-from .linear import Weights, White, assemble, compressed, correct, key_of, weights_from, white_rows
+from .linear import Weights, White, assemble, compressed, correct, full_model, key_of, weights_from, white_rows
 from .model import Parameter, Unit, Variant
 from .search import REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
-ROUNDS = 5
+ROUNDS = 3
 FIRST = 2  # steps of the unit alone before the search
-LEAVES = 2  # times that a member of the leading set may fall at a closer look
+LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 STILL = 0.3  # prior standard deviations by which the point may still move
 
@@ -74,6 +74,7 @@ class Bench:
                 self._beyond.setdefault(p.alias, []).append(n)
         self.corrected = True
         self.remainders: dict[str, Unit] = {}
+        self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
 
     # ---- linearisation
     def active(self, unit: Unit) -> list[Variant]:
@@ -101,10 +102,10 @@ class Bench:
                 out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
         return out
 
-    def linearise(self, model: Model | None = None, full: Mapping[str, float] | None = None) -> list[White]:
+    def linearise(self, model: Model | None = None, renew: bool = False) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
-        ``full`` deviations of a full model renew the weights first.
+        ``renew`` takes the weights from what a full model leaves there.
         """
         columns, aliases = self.columns()
         if model is not None:
@@ -112,20 +113,35 @@ class Bench:
             columns = [n for n in columns if n in inside]
         wanted = list(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
         own = None if model is None else {u.split(":", 1)[1] for u in model.units if u.startswith("remainder:")}
-        task = _Task(self.values(), wanted, model is not None, own, full, self.corrected)
-        out = []
-        for whites, weights in self._each(task):
-            out += whites
-            self.weights |= weights
+        task = _Task(self.values(), wanted, model is not None, own, None, self.corrected and not renew)
+        whites = self._each(task)
+        if renew:
+            full = full_model(whites, self._full_prior(columns, aliases))
+            whites = self._each(replace(task, full=full, corrected=self.corrected))
+        return whites
+
+    def _full_prior(self, columns: Sequence[str], aliases: Mapping[str, str]) -> dict[str, tuple[float, float]]:
+        """Mean and standard deviation of deviations with everything free, an alias's width added to its quantity's."""
+        out = {n: self.prior(n)[:2] for n in self.nuisances}
+        for n in columns:
+            mean, sd, _ = self.prior(n)
+            own = aliases.get(n, n)
+            before = out.get(own, (0.0, 0.0))
+            # in the full model an effect has the prior's width around where it is
+            out[own] = (before[0], float(np.hypot(before[1], sd)))
         return out
 
-    def _each(self, task: "_Task") -> list:
-        """A task done for every recording, side by side where there are processes for it."""
+    def _each(self, task: "_Task") -> list[White]:
+        """A task done for every recording, side by side where there are processes for it; takes renewed weights over."""
         if self.processes > 1 and len(self.recordings) > 1:
             for name in self.recordings:
                 self.machine.prepare(name)
-            return forked(lambda name: self._compress(task, name), self.recordings, self.processes)
-        return [self._compress(task, name) for name in self.recordings]
+            found = forked(lambda name: self._compress(task, name), self.recordings, self.processes)
+        else:
+            found = [self._compress(task, name) for name in self.recordings]
+        for _, renewed in found:
+            self.weights |= renewed
+        return [w for whites, _ in found for w in whites]
 
     def _compress(self, task: "_Task", recording: str) -> tuple[list[White], dict[tuple[str, str], Weights]]:
         only = set(task.wanted) if task.only else None
@@ -133,16 +149,17 @@ class Bench:
         again: Sequence = [None] * len(blocks)
         if task.corrected:
             again = self.machine.blocks(task.values, recording, disturbed=True, wanted=only)
-        out, renewed = [], {}
-        for block, other in zip(blocks, again, strict=True):
-            remainder = task.remainders is None or block.equation in task.remainders
-            names, rows = white_rows(block, task.wanted, remainder)
-            weights = self.weights.get(key_of(block))
-            if task.full is not None:
-                weights = renewed[key_of(block)] = weights_from(block, names, rows, task.full)
-            white = compressed(block, names, rows, weights)
+        parts = [white_rows(b, task.wanted, task.remainders is None or b.equation in task.remainders) for b in blocks]
+        weights = {key_of(b): self.weights.get(key_of(b)) for b in blocks}
+        renewed: dict[tuple[str, str], Weights] = {}
+        if task.full is not None:
+            renewed = {key_of(b): weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
+        weights |= renewed
+        out = []
+        for block, other, part in zip(blocks, again, parts, strict=True):
+            white = compressed(block, *part, weights[key_of(block)])
             if other is not None:
-                correct(white, block, other, weights)
+                correct(white, block, other, weights[key_of(block)])
             out.append(white)
         return out, renewed
 
@@ -267,46 +284,6 @@ class Bench:
             )  # fmt: skip
         return [*self.units, *self.remainders.values()], out
 
-    # ---- the full model, from which the weights come
-    def full(self, normal: Normal) -> dict[str, float]:
-        """Deviations with everything free under its prior: what this leaves is noise, or beyond all of the library."""
-        names = normal.names
-        prior = [self.prior(n) for n in names]
-        mean = np.array([0.0 if n not in set(self.nuisances) else q[0] for n, q in zip(names, prior, strict=True)])
-        sd = np.array([q[1] for q in prior])
-        A = normal.H + np.diag(1.0 / sd**2)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1.0 / sd**2))
-        found = scale * solve(A * np.outer(scale, scale), scale * (mean / sd**2 - normal.g), assume_a="sym")
-        return dict(zip(names, found.tolist(), strict=True))
-
-    def full_values(self, normal: Normal) -> dict[str, float]:
-        """Where the full model lies: values of parameters, amounts of remainders and secants."""
-        deviations = self.full(normal)
-        plain = {n: d for n, d in deviations.items() if not self._amount(n)}
-        return self.after(plain) | {n: d for n, d in deviations.items() if self._amount(n)}
-
-    def _amount(self, name: str) -> bool:
-        return name.startswith("remainder.") or self.parameters[name].secant is not None
-
-    def deviations_to(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Deviations of columns from the present point to values, aliases added to their quantities."""
-        out: dict[str, float] = {}
-        for n, value in values.items():
-            if self._amount(n):
-                out[n] = value
-                continue
-            p = self.parameters[n]
-            own = p.alias or n
-            if p.vanishes is None:
-                d = value - self.point.get(n, p.off)
-            else:
-                u, factor = self._factor(n)
-                base = values.get(own, self.point[own]) - p.vanishes
-                there = (base + value) / base if p.alias else value - p.vanishes
-                d = u * float(np.log(max(there / factor, 1e-3)))
-            out[own] = out.get(own, 0.0) + d
-        return out
-
     # ---- the whole
     def move(self, model: Model, normal: Normal) -> float:
         """Move the point to a model's fit; returns the largest step in prior standard deviations."""
@@ -357,10 +334,9 @@ class Bench:
         normal = self.normal(whites)
         # the unit first: its nuisances move the point before anything is compared
         for _ in range(1 if warm else FIRST):
-            full = self.full_values(normal)
             if not warm:
                 self.move(Model((), 0.0, 0.0, {}, {}), normal)
-            whites = self.linearise(full=self.deviations_to(full))
+            whites = self.linearise(renew=True)
             normal = self.normal(whites)
         # what no one has described comes last: it would take up what only a better point explains
         whites, normal, search = self._until_still(whites, normal, FIRST, False)
@@ -375,16 +351,13 @@ class Bench:
     def _until_still(
         self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
     ) -> tuple[list[White], Normal, Search]:
-        leading: tuple[str, ...] = ()
         search = self._search(normal, remainders)
         for _ in range(rounds):
             best = search.ranked()[0]
-            if best.units == leading and self._step(best, normal) < STILL:
+            if self._step(best, normal) < STILL:
                 break
-            leading = best.units
-            full = self.full_values(normal)
             self.settle(best, normal)
-            whites = self.linearise(full=self.deviations_to(full))
+            whites = self.linearise(renew=True)
             normal = self.normal(whites)
             search = self._search(normal, remainders)
         return whites, normal, search
@@ -397,7 +370,7 @@ class Bench:
         units, candidates = self.candidates(reduced)
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
-        search = Search(reduced, units, candidates)
+        search = Search(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
         search.run()
         return search
 
@@ -454,11 +427,17 @@ class Bench:
             less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
             self._switch_off(unit)
             own = self.settle(Model(less.choices, 0.0, 0.0, {}, {}))
-            less.log_posterior = best.log_posterior + own.log_posterior - leading.log_posterior
+            error = best.log_posterior - less.log_posterior - (leading.log_posterior - own.log_posterior)
+            if self._by_secant(unit):
+                self.closer[unit] = -error
+            less.log_posterior += error
             if own.log_posterior > top:
                 top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
         self.point, self.on = better[0]
         return better[1]
+
+    def _by_secant(self, unit: str) -> bool:
+        return any(p.secant is not None for u in self.units if u.id == unit for p in u.parameters)
 
     def _switch_off(self, unit: str) -> None:
         for p in next(u for u in self.units if u.id == unit).parameters:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal
 from .model import Block
@@ -140,6 +141,19 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         g[into] += w.gram[rows, -1]
         c += w.gram[-1, -1] - w.own
     return Normal(list(names), H, g, c)
+
+
+def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    """Deviations with everything free under its prior: what they leave is noise, or beyond all of the library.
+
+    ``prior`` column -> mean and standard deviation; remainders have one of unit width.
+    """
+    names = list(dict.fromkeys(n for w in whites for n in w.names))
+    normal = assemble(whites, names, {})
+    mean, sd = np.array([prior.get(n, (0.0, 1.0)) for n in names]).T
+    A = normal.H * np.outer(sd, sd) + np.eye(len(names))
+    d = mean + sd * cho_solve(cho_factor(A), -(normal.g + normal.H @ mean) * sd)
+    return dict(zip(names, d.tolist(), strict=True))
 
 
 def weights_from(block: Block, names: Sequence[str], rows: np.ndarray, deviations: Mapping[str, float]) -> Weights:

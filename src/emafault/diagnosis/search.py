@@ -1,6 +1,6 @@
 """The posterior over sets of listed effects, described forms and equations with a remainder."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -62,12 +62,19 @@ class Candidate:
 class Search:
     """Beam search with additions, removals and swaps over a linearised model."""
 
-    def __init__(self, reduced: Reduced, units: Sequence[Unit], candidates: dict[tuple[str, int], Candidate]):
+    def __init__(
+        self,
+        reduced: Reduced,
+        units: Sequence[Unit],
+        candidates: dict[tuple[str, int], Candidate],
+        corrections: Mapping[str, float] | None = None,
+    ):
         self.reduced = reduced
         self.units = {u.id: u for u in units}
         self.candidates = candidates
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
         self.tempering = 1.0
+        self.corrections = corrections or {}
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
         self.counts = listed, every.count("form"), every.count("remainder")
@@ -84,6 +91,7 @@ class Search:
             if (widths or {}).get(m) is None and len(self.candidates[m].widths) > 1:
                 best, width = self._widen(members, m, width, best)
         value, index, mean, deviation = best
+        value += sum(self.corrections.get(m[0], 0.0) for m in members)
         value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
         value -= sum(np.log(self.variants(m[0])) for m in members)
         names = [self.reduced.names[k] for k in index]

@@ -4,6 +4,8 @@ The mean of e_j is k_j times the integral of f over the angle swept, the mean of
 flux between the interval's ends.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.ndimage import binary_dilation
 
@@ -13,6 +15,8 @@ from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
 
+RUN = 1e-3  # s, longest run of intervals that is averaged
+UNKNOWN = 0.2  # of the inductance's voltage, where no end currents tell of tolerance and saturation
 BESIDE = 2  # intervals in which a current may fade after its phase is switched off
 NAMES = ("electrical_a", "electrical_b", "electrical_c")
 
@@ -52,7 +56,11 @@ def residuals(state: State) -> dict[str, Dual]:
     out = {}
     for j, name in enumerate(NAMES):
         drift = state.p(f"drift_voltage.{'abc'[j]}@{rec.name}")
-        out[name] = rec.voltage[:, j] - true[j] - drift * share
+        residual = rec.voltage[:, j] - true[j] - drift * share
+        if rec.current_end is None:
+            of = averaging(state, j)
+            residual = residual.linear(lambda x, of=of: of(x), rec.size)
+        out[name] = residual
     return out
 
 
@@ -66,14 +74,39 @@ def _recorded(state: State, true: list[Dual]) -> list[Dual]:
 
 
 def usable(state: State, j: int) -> np.ndarray:
-    """(sample,) where the flux's change is known: without end currents not where the phase is switched on or off."""
-    rec = state.rec
-    out = np.ones(rec.size, bool)
-    if rec.current_end is None:
-        for edge in (j, (j + 1) % 3):
-            for shift in (-1, 0, 1):
-                out[np.clip(rows_of(state, edge) + shift, 0, rec.size - 1)] = False
+    """(row,) which rows count."""
+    if state.rec.current_end is None:
+        return np.ones(len(_runs(state, j)[0]), bool)
+    out = np.ones(state.rec.size, bool)
+    out[0] = out[-1] = False
     return out
+
+
+def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
+    """Means over runs of intervals between commutations, where no end currents are recorded: (sample,) -> (run,).
+
+    The flux's change over a run is that between its ends, so that the ripple in between drops out, which neighbouring means
+    do not tell and which goes with the ripple of the regressors.
+    """
+    starts, lengths, rows = _runs(state, j)
+    return lambda x: np.add.reduceat(np.asarray(x, float)[rows], starts) / lengths
+
+
+def _runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where runs begin among their rows, their lengths, and the rows (sample,): none around phase j's commutations."""
+    rec = state.rec.rows_from
+    known = np.ones(rec.size, bool)
+    known[[0, -1]] = False
+    for edge in (j, (j + 1) % 3):
+        for shift in (-1, 0, 1):
+            known[np.clip(rows_of(state, edge) + shift, 0, rec.size - 1)] = False
+    rows = np.flatnonzero(known)
+    longest = max(1, round(RUN / rec.interval))
+    fresh = np.concatenate([[True], np.diff(rows) > 1])
+    first = np.flatnonzero(fresh)
+    since = np.arange(len(rows)) - first[np.cumsum(fresh) - 1]
+    starts = np.flatnonzero(since % longest == 0)
+    return starts, np.diff(starts, append=len(rows)), rows
 
 
 def switched_on(state: State, j: int) -> np.ndarray:
@@ -90,14 +123,15 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
     white = s.voltage**2 + (a.resistance * s.current) ** 2
     f = np.asarray(value_of(state.conducting[j]))
     angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
-    if rec.current_end is None:  # the mean of two neighbours is off by the ripple, and by a sixth of the curvature
+    if rec.current_end is None:
+        of, (_, lengths, _) = averaging(state, j), _runs(state, j)
+        # at a run's ends the mean of two neighbours is off by the ripple, and by a sixth of the curvature
         i = rec.current[:, j]
-        bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:]))
-        bend = np.maximum(bend, np.concatenate([bend[:1], bend[:-1]])) / 6.0
-        on = switched_on(state, j)
-        white = white + 2.0 * (a.inductance / rec.interval) ** 2 * (on * a.hysteresis**2 / 3.0 + bend**2)
-        differenced = angle
-    else:
-        differenced = (a.inductance / rec.interval * s.current_end) ** 2 + angle
+        bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:])) / 6.0
+        ends = switched_on(state, j) * a.hysteresis**2 / 3.0 + bend**2
+        ends = 2.0 * (a.inductance / rec.interval / lengths) ** 2 * of(ends)
+        unknown = (UNKNOWN * of(np.asarray(value_of(state.rise[j])))) ** 2
+        return [(white + 2.0 * of(angle) / lengths) / lengths + ends + unknown]
+    differenced = (a.inductance / rec.interval * s.current_end) ** 2 + angle
     before = np.concatenate([differenced[:1], differenced[:-1]])
     return [white + differenced + before, -differenced[:-1]]

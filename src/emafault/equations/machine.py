@@ -1,6 +1,6 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import Block, Parameter, Unit, Variant
 from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
+from .dual import Dual
 from .point import Point, State
 from .signals import Signals
 from .terms import TERMS
@@ -148,8 +149,9 @@ class ReferenceActuator:
             ]
             out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants))
         pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
-        parameters = [Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1") for j, q in pairs]
-        out.append(Unit("~crosstalk_current", "form", ("sensor_current",), [Variant(parameters)]))
+        # one pair: what both others add to a phase together is a gain, for the three add up to nothing
+        variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
+        out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
         for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
             for j in PER_PHASE:
                 parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings]
@@ -182,7 +184,7 @@ class ReferenceActuator:
         state = State(rec, point)
         found = []
         for j, (name, r) in enumerate(electrical.residuals(state).items()):
-            found.append((name, r, electrical.noise_bands(state, j), _not_first(rec) & electrical.usable(state, j)))
+            found.append((name, r, electrical.noise_bands(state, j), electrical.usable(state, j)))
         found.append(
             ("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec))
         )
@@ -209,9 +211,13 @@ class ReferenceActuator:
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""
         out: dict[str, np.ndarray] = {}
-        reach = {"sensor_speed": sensor_speed, "torque": torque, "position": position}
+        reach: dict[str, Callable[[State], Dual]] = {
+            "sensor_speed": lambda at: -sensor_speed.predicted(at), "torque": torque.residual,
+            "position": position.residual,
+        }  # fmt: skip
         if equation not in reach:
             return out
+        without = None if equation == "sensor_speed" else r
         for unit in self.units:
             for variant in unit.variants:
                 for p in variant.parameters:
@@ -221,9 +227,11 @@ class ReferenceActuator:
                         continue
                     if any(values[n] != self.parameters[n].off for n in p.secant):
                         continue  # at a point where the effect is on, its own derivatives serve
+                    if without is None:
+                        without = reach[equation](state)
                     kept = state.p
                     state.p = Point({**values, **p.secant}, state.rec.name, ())
-                    out[p.name] = np.asarray(reach[equation].residual(state).value) - np.asarray(r.value)
+                    out[p.name] = np.asarray(reach[equation](state).value) - np.asarray(without.value)
                     state.p = kept
         return out
 
@@ -267,20 +275,29 @@ class ReferenceActuator:
             drivers += [state.bus_current]
         elif equation == "position":
             drivers += [rec.direction, rec.acceleration / 1e3]
-        rows: np.ndarray | slice = slice(None)
+        def of(x: np.ndarray) -> np.ndarray:
+            return x
+
         if equation == "control":
             width = control.block_length(rec)
-            count = rec.size // width - 1
-            rows = (np.arange(count) + 1) * width
+            rows = (np.arange(rec.size // width - 1) + 1) * width
             phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
+            of = rows_at(rows)
         elif equation == "commutation":
-            rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
+            of = rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
+        elif equation.startswith("electrical") and rec.current_end is None:
+            of = electrical.averaging(state, "abc".index(equation[-1]))
         return {
-            **{k: v[rows] for k, v in base.items()},
-            "phi": np.array([f[rows] for f in phi]),
-            "drivers": np.array([d[rows] for d in drivers]),
+            **{k: of(v) for k, v in base.items()},
+            "phi": np.array([of(f) for f in phi]),
+            "drivers": np.array([of(d) for d in drivers]),
             "slow": SLOW_FUNCTIONS,
         }
+
+
+def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Picks rows of a signal."""
+    return lambda x: x[rows]
 
 
 def _acts(unit: Unit, equation: str) -> bool:

@@ -14,8 +14,13 @@ def residual(state: State) -> Dual:
     Its derivatives are taken of the smoothed speed, whose noise is nearly independent of the residual's.
     """
     rec = state.rec
-    exact, calm = (recorded_late(state.p, "speed", seen_speed(state, Dual(w)), rec.size) for w in (rec.rate, rec.speed))
-    return rec.speed_recorded - Dual(exact.value, calm.slopes)
+    exact = recorded_late(state.p, "speed", seen_speed(state, Dual(rec.rate)), rec.size)
+    return rec.speed_recorded - Dual(exact.value, predicted(state).slopes)
+
+
+def predicted(state: State) -> Dual:
+    """Recorded speed as the smoothed speed predicts it (rad/s)."""
+    return recorded_late(state.p, "speed", seen_speed(state, Dual(state.rec.speed)), state.rec.size)
 
 
 def seen_speed(state: State, w: Dual) -> Dual:
