@@ -8,7 +8,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal, Reduced, marginalise
 from .forked import forked
-from .linear import Weights, White, assemble, compressed, correct, full_model, key_of, weights_from, white_rows
+from .linear import OWN_FORM, Weights, White, assemble, compressed, correct, full_model, key_of, weights_from, white_rows
 from .model import Parameter, Unit, Variant
 from .search import REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
@@ -16,7 +16,14 @@ ROUNDS = 3
 FIRST = 2  # steps of the unit alone before the search
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
+CARRYING = 5  # units that carry their own form
+SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 STILL = 0.3  # prior standard deviations by which the point may still move
+
+
+def is_parameter(column: str) -> bool:
+    """Whether a column is a parameter's, and not a function of a remainder or of an effect's own form."""
+    return not column.startswith(("remainder.", "own."))
 
 
 @dataclass
@@ -42,6 +49,7 @@ class _Task:
     remainders: set[str] | None
     full: Mapping[str, float] | None
     corrected: bool
+    own: Mapping[str, Mapping[str, float]]
 
 
 class Bench:
@@ -74,6 +82,7 @@ class Bench:
                 self._beyond.setdefault(p.alias, []).append(n)
         self.corrected = True
         self.remainders: dict[str, Unit] = {}
+        self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
         self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
 
     # ---- linearisation
@@ -113,7 +122,9 @@ class Bench:
             columns = [n for n in columns if n in inside]
         wanted = list(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
         own = None if model is None else {u.split(":", 1)[1] for u in model.units if u.startswith("remainder:")}
-        task = _Task(self.values(), wanted, model is not None, own, None, self.corrected and not renew)
+        task = _Task(
+            self.values(), wanted, model is not None, own, None, self.corrected and not renew, self._amounts(model)
+        )
         whites = self._each(task)
         if renew:
             full = full_model(whites, self._full_prior(columns, aliases))
@@ -149,7 +160,13 @@ class Bench:
         again: Sequence = [None] * len(blocks)
         if task.corrected:
             again = self.machine.blocks(task.values, recording, disturbed=True, wanted=only)
-        parts = [white_rows(b, task.wanted, task.remainders is None or b.equation in task.remainders) for b in blocks]
+        parts = [
+            white_rows(
+                b, task.wanted, task.remainders is None or b.equation in task.remainders,
+                task.own if b.equation not in SETTINGS else None,
+            )
+            for b in blocks
+        ]  # fmt: skip
         weights = {key_of(b): self.weights.get(key_of(b)) for b in blocks}
         renewed: dict[tuple[str, str], Weights] = {}
         if task.full is not None:
@@ -166,7 +183,7 @@ class Bench:
     def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
         """Equation, (row,) what deviations add to each block in units of its noise, and what its rows lie along."""
         _, aliases = self.columns()
-        wanted = list(dict.fromkeys(aliases.get(n, n) for n in deviations if not n.startswith("remainder.")))
+        wanted = list(dict.fromkeys(aliases.get(n, n) for n in deviations if is_parameter(n)))
         out = []
         for name in self.recordings:
             for block in self.machine.blocks(self.values(), name, wanted=set(wanted)):
@@ -174,6 +191,28 @@ class Bench:
                 d = np.array([deviations.get(n, 0.0) for n in names])
                 out.append((block.equation, rows[:, :-1] @ d, block.coordinates))
         return out
+
+    def _amounts(self, model: Model | None) -> dict[str, dict[str, float]]:
+        """Sizes from off, by column, of the units that carry their own form."""
+        out = {}
+        for unit in self.units:
+            if unit.id not in self.sizes or (model is not None and unit.id not in model.units):
+                continue
+            sizes = self.sizes[unit.id]
+            if unit.on is not None and unit.id in self.on:
+                sizes = {p.name: -self.prior(p.name)[2] for p in unit.on.parameters}
+            out[unit.id] = {self.parameters[n].alias or n: d for n, d in sizes.items()}
+        return out
+
+    def _carry_own_forms(self, search: Search) -> None:
+        """Units of good sets may take another form than the library's, in proportion to their size."""
+        chosen: dict[str, dict[str, float]] = {}
+        for model in search.ranked():
+            for choice in model.choices:
+                if len(chosen) < CARRYING and self._kind(choice.unit) != "remainder" and choice.unit not in chosen:
+                    names = self.names_of(choice)
+                    chosen[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
+        self.sizes = chosen
 
     def names_of(self, choice: Choice) -> list[str]:
         """Columns of a unit's variant at the present point."""
@@ -188,13 +227,13 @@ class Bench:
         if model is not None:
             inside = {n for c in model.choices for n in self.names_of(c)}
             columns = [n for n in columns if n in inside]
-        left = list(dict.fromkeys(n for w in whites for n in w.names if n.startswith("remainder.")))
+        left = list(dict.fromkeys(n for w in whites for n in w.names if not is_parameter(n)))
         return assemble(whites, [*self.nuisances, *columns, *left], aliases)
 
     def prior(self, name: str) -> tuple[float, float, float]:
         """Deviation of the prior's mean from the point, its standard deviation, and the deviation that is off."""
-        if name.startswith("remainder."):
-            return 0.0, 1.0, 0.0
+        if not is_parameter(name):
+            return 0.0, OWN_FORM if name.startswith("own.") else 1.0, 0.0
         p = self.parameters[name]
         at = self.point.get(name, p.off)
         if p.vanishes is None:
@@ -221,7 +260,7 @@ class Bench:
         """Values of parameters after deviations from the point."""
         out: dict[str, float] = {}
         for n, d in given.items():
-            if n.startswith("remainder."):
+            if not is_parameter(n):
                 continue
             p = self.parameters[n]
             if p.vanishes is None:
@@ -270,9 +309,11 @@ class Bench:
                 prior = [self.prior(n) for n in names]
                 signs = np.array(list(variant.signs) or [0] * len(names))
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
+                own = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"own.{unit.id}.")], int)
                 out[unit.id, v] = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
+                    own, np.full(len(own), OWN_FORM),
                 )  # fmt: skip
         for equation in dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder.")):
             index = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"remainder.{equation}.")])
@@ -340,6 +381,9 @@ class Bench:
             normal = self.normal(whites)
         # what no one has described comes last: it would take up what only a better point explains
         whites, normal, search = self._until_still(whites, normal, FIRST, False)
+        self._carry_own_forms(search)
+        whites = self.linearise(renew=True)
+        normal = self.normal(whites)
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
             if not self._leave_out(search):

@@ -10,6 +10,9 @@ from .evidence import Normal
 from .model import Block
 from .whitening import OUTLIER, autoregression, filtered, whiten
 
+OWN = slice(1, 14)  # functions that an effect's own form is made of
+OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
+SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 
 
@@ -58,15 +61,31 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
     return names, columns
 
 
-def white_rows(block: Block, wanted: Sequence[str], remainder: bool) -> tuple[list[str], np.ndarray]:
-    """A block's columns ``wanted`` that act in it, with its remainder's, and its residual last: names without that of
-    the residual, and (row, column) divided by the noise's covariance."""
+def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
+    """What a unit of these amounts adds to a block, times functions of the coordinates: its own form in so far as it is not
+    the library's."""
+    parts = [amount * np.asarray(block.columns[n]) for n, amount in amounts.items() if n in block.columns]
+    added = np.broadcast_to(sum(parts, np.zeros(1)), len(block.residual))
+    if np.sum(added[block.usable] ** 2 / block.bands[0][block.usable]) < SEEN:
+        return [], []
+    phi = block.coordinates["phi"][OWN]
+    return [f"own.{unit}.{block.equation}.{f}" for f in range(len(phi))], [added * f for f in phi]
+
+
+def white_rows(
+    block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
+) -> tuple[list[str], np.ndarray]:
+    """A block's columns ``wanted`` that act in it, with its remainder's and units' own forms, and its residual last: names
+    without that of the residual, and (row, column) divided by the noise's covariance."""
     names = [n for n in wanted if n in block.columns]
     count = len(block.residual)
     columns = [np.broadcast_to(block.columns[n], count) for n in names]
     if remainder:
         size = float(np.sqrt(np.median(block.bands[0])))
         more, extra = remainder_columns(block, size)
+        names, columns = names + more, columns + extra
+    for unit, amounts in (own or {}).items():
+        more, extra = own_columns(block, unit, amounts)
         names, columns = names + more, columns + extra
     raw = np.empty((count, len(names) + 1))
     for k, c in enumerate(columns):
@@ -150,7 +169,7 @@ def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]
     """
     names = list(dict.fromkeys(n for w in whites for n in w.names))
     normal = assemble(whites, names, {})
-    mean, sd = np.array([prior.get(n, (0.0, 1.0)) for n in names]).T
+    mean, sd = np.array([prior.get(n, (0.0, OWN_FORM if n.startswith("own.") else 1.0)) for n in names]).T
     A = normal.H * np.outer(sd, sd) + np.eye(len(names))
     d = mean + sd * cho_solve(cho_factor(A), -(normal.g + normal.H @ mean) * sd)
     return dict(zip(names, d.tolist(), strict=True))

@@ -10,7 +10,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed
-from ..diagnosis.fit import Bench, Fit
+from ..diagnosis.fit import Bench, Fit, is_parameter
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
@@ -126,8 +126,9 @@ def _from_off(bench: Bench, model: Model) -> dict[str, float]:
     """A model's own parameters as deviations from off, by the name of their columns."""
     out: dict[str, float] = {}
     for n, d in model.deviations.items():
-        if n.startswith("remainder."):
-            out[n] = d
+        if not is_parameter(n):
+            if n.startswith("remainder."):
+                out[n] = d
             continue
         p = bench.parameters[n]
         out[p.alias or n] = out.get(p.alias or n, 0.0) + d - bench.prior(n)[2]
@@ -154,7 +155,7 @@ def _parameters(bench: Bench, machine: ReferenceActuator, effects: Sequence[str]
 def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float, float]]:
     values, spread = {}, {}
     for n, d in model.deviations.items():
-        if n.startswith("remainder."):
+        if not is_parameter(n):
             continue
         p = bench.parameters[n]
         if n.split(".")[0].split("#")[0] != effect:
@@ -288,7 +289,7 @@ def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
 
 def _spreads(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     """Posterior standard deviations of the nuisances with a model's own parameters free."""
-    names = [*bench.nuisances, *(n for n in model.deviations if not n.startswith("remainder."))]
+    names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
     k = np.array([fit.normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
     A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
@@ -341,7 +342,7 @@ def _shrinks(bench: Bench, held_out, best: Model, before: Mapping, recordings, v
         rungs[rung] = (*ladder.rung(whites), whites)
     recalibrated, rows, whites = rungs["recalibrated"]
     after = rungs["after"][0]
-    size = sum(not n.startswith("remainder.") for n in model.deviations)
+    size = sum(is_parameter(n) for n in model.deviations)
     signal = {
         "nominal": rungs["nominal"][0], "recalibrated": recalibrated, "placebo": ladder.placebo(whites, size),
         "after": after, "floor": 1.0, "closed": closed(recalibrated, after, 1.0, rows),
