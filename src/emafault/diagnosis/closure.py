@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from .evidence import Reduced
 from .linear import Weights, White, assemble, compressed, key_of, white_rows
 
 STEPS = 2  # of a refit of what belongs to a recording alone
@@ -23,52 +24,71 @@ class Ladder:
     ):
         self.machine, self.recordings, self.parameters, self.weights = machine, list(recordings), parameters, weights
 
-    def blocks(self, values: Mapping[str, float]) -> tuple[list[White], dict[str, float]]:
-        """Whitened blocks at frozen values, what is each recording's own refitted, and the values so found."""
-        values = dict(values)
+    def blocks(self, values: Mapping[str, float], remainders: bool = False) -> list[White]:
+        """Whitened blocks at frozen values, what is each recording's own refitted; with columns of remainders if asked."""
         out: list[White] = []
         for recording in self.recordings:
             free = [n for n in own(list(self.parameters), recording) if n in values]
-            whites: list[White] = []
+            mine = dict(values)
             for step in range(STEPS + 1):
+                last = step == STEPS
                 whites = [
-                    compressed(b, *white_rows(b, free, False), self.weights.get(key_of(b)))
-                    for b in self.machine.blocks(values, recording, wanted=free)
+                    compressed(b, *white_rows(b, free, remainders and last), self.weights.get(key_of(b)))
+                    for b in self.machine.blocks(mine, recording, wanted=free)
                 ]
-                if step == STEPS:
+                if last:
+                    out += whites
                     break
                 normal = assemble(whites, free, {})
                 sd = np.array([self.parameters[n].sd for n in free])
-                mean = np.array([self.parameters[n].mean - values[n] for n in free])
+                mean = np.array([self.parameters[n].mean - mine[n] for n in free])
                 A = normal.H * np.outer(sd, sd) + np.eye(len(free))
                 right = mean / sd - normal.g * sd
                 for n, d in zip(free, sd * np.linalg.solve(A, right), strict=True):
-                    values[n] += float(d)
-            out += whites
-        return out, values
-
-    def rung(self, whites: Sequence[White], extra: Mapping[str, float] | None = None) -> tuple[float, int]:
-        """Root mean square of the whitened residual and its number of rows."""
-        total = sum(float(w.gram[-1, -1]) for w in whites)
-        count = sum(w.count for w in whites)
-        return float(np.sqrt(total / max(count, 1))), count
-
-    def placebo(self, whites: Sequence[White], size: int) -> float:
-        """Median root mean square with random signatures of as many parameters, their amplitudes from the noise.
-
-        A signature that is fitted elsewhere and knows nothing of these recordings adds its own uncertainty: the fitted
-        amplitude of a random column is a draw of unit variance over the column's norm.
-        """
-        rng = np.random.default_rng(20)
-        base = sum(float(w.gram[-1, -1]) for w in whites)
-        count = self.rung(whites)[1]
-        return float(
-            np.median([np.sqrt((base + rng.chisquare(max(size, 1))) / max(count, 1)) for _ in range(PLACEBOS)])
-        )
+                    mine[n] += float(d)
+        return out
 
 
-def closed(recalibrated: float, after: float, floor: float, rows: int) -> float | None:
+def rms(whites: Sequence[White]) -> float:
+    """Root mean square of the whitened residual."""
+    return float(np.sqrt(sum(float(w.gram[-1, -1]) for w in whites) / max(rows(whites), 1)))
+
+
+def rows(whites: Sequence[White]) -> int:
+    """Number of rows used."""
+    return sum(w.count for w in whites)
+
+
+def placebo(explored: Reduced, confirm: Sequence[White], equations: Sequence[str], size: int) -> float:
+    """Median root mean square on the confirm recordings with random signatures fitted to the explored ones.
+
+    Parameters
+    ----------
+    explored : log evidence at the recalibrated nominal model, the nuisances marginalised
+    confirm : blocks there, with their columns of remainders
+    equations : in which the signatures act; they are random functions of the remainder's coordinates
+    size : number of signatures, as many as the named set has parameters
+    """
+    every = list(dict.fromkeys(n for w in confirm for n in w.names if n.startswith("remainder.")))
+    names = [n for n in every if n.split(".")[1] in equations and n in explored.index]
+    base = float(sum(w.gram[-1, -1] for w in confirm))
+    if not names or size < 1:
+        return rms(confirm)
+    held = assemble(confirm, names, {})
+    k = np.array([explored.index[n] for n in names])
+    M, b = explored.M[np.ix_(k, k)], explored.b[k]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(M), 1e-12))
+    rng = np.random.default_rng(20)
+    found = []
+    for _ in range(PLACEBOS):
+        C = scale[:, None] * rng.standard_normal((len(names), size))
+        a = C @ np.linalg.lstsq(C.T @ M @ C, C.T @ b, rcond=None)[0]
+        found.append(max(base + 2.0 * held.g @ a + a @ held.H @ a, 0.0))
+    return float(np.sqrt(np.median(found) / max(rows(confirm), 1)))
+
+
+def closed(recalibrated: float, after: float, floor: float, count: int) -> float | None:
     """Share of the closable gap that is closed; None where the closable gap is below twice its standard error."""
     closable = recalibrated**2 - floor**2
-    error = np.sqrt((4.0 * max(recalibrated, 1.0) ** 2 - 2.0) / max(rows, 1))
+    error = np.sqrt((4.0 * max(recalibrated, 1.0) ** 2 - 2.0) / max(count, 1))
     return float((recalibrated**2 - after**2) / closable) if closable >= 2.0 * error else None

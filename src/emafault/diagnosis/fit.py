@@ -10,7 +10,7 @@ from .evidence import Normal, Reduced, marginalise
 from .forked import forked
 from .linear import OWN_FORM, Weights, White, assemble, compressed, correct, full_model, key_of, weights_from, white_rows
 from .model import Parameter, Unit, Variant
-from .search import REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
+from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
 ROUNDS = 3
 FIRST = 2  # steps of the unit alone before the search
@@ -219,7 +219,7 @@ class Bench:
         if choice.unit.startswith("remainder:"):
             return []
         unit = next(u for u in self.units if u.id == choice.unit)
-        return [p.name for p in self.active(unit)[choice.variant].parameters]
+        return [p.name for p in self.active(unit)[choice.variant % OTHER_FORM].parameters]
 
     def normal(self, whites: Sequence[White], model: Model | None = None) -> Normal:
         """Normal matrix of all columns, or of those that a model has, remainders among them."""
@@ -310,11 +310,13 @@ class Bench:
                 signs = np.array(list(variant.signs) or [0] * len(names))
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
                 own = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"own.{unit.id}.")], int)
-                out[unit.id, v] = Candidate(
+                plain = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
-                    own, np.full(len(own), OWN_FORM),
                 )  # fmt: skip
+                out[unit.id, v] = plain
+                if len(own):
+                    out[unit.id, v + OTHER_FORM] = replace(plain, extra=own, extra_sd=np.full(len(own), OWN_FORM))
         for equation in dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder.")):
             index = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"remainder.{equation}.")])
             unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])])
@@ -338,7 +340,7 @@ class Bench:
         for unit in self.units:
             if unit.id not in inside:
                 continue
-            for p in self.active(unit)[inside[unit.id].variant].parameters:
+            for p in self.active(unit)[inside[unit.id].variant % OTHER_FORM].parameters:
                 d = given.get(p.name, 0.0)
                 if p.secant is not None:
                     switched.append((unit, p, d))
@@ -443,12 +445,18 @@ class Bench:
         found = model
         for _ in range(SETTLING):
             shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
-            choices = tuple(replace(c, variant=0) if c.unit in shaped else c for c in members.values())
+            choices = tuple(
+                replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c
+                for c in members.values()
+            )
             this = replace(model, choices=choices)
             at_point = self.normal(self.linearise(this), this)
             units, candidates = self.candidates(self.reduce(at_point))
             search = Search(self.reduce(at_point), units, candidates)
-            width = {(c.unit, c.variant): c.width for c in choices}
+            width = {
+                (c.unit, c.variant if (c.unit, c.variant) in candidates else c.variant % OTHER_FORM): c.width
+                for c in choices
+            }
             found = search.fit(tuple(width), {m: w for m, w in width.items() if w in candidates[m].widths})
             if self.move(found, at_point) < STILL:
                 break

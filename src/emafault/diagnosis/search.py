@@ -1,7 +1,7 @@
 """The posterior over sets of listed effects, described forms and equations with a remainder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -14,6 +14,8 @@ FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
+OTHER_FORM = 10  # added to a variant's number where the unit takes a form of its own beside the library's
+OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 BEAM = 4
 ADDED = 15  # units tried in addition to a set
 SWAPPED = 5  # units tried in the place of each member
@@ -105,6 +107,17 @@ class Search:
         self.seen[members] = model
         return model
 
+    def wide(self, model: Model) -> Model:
+        """The same set under the widest priors, whose estimates are shrunk the least."""
+        members = tuple((c.unit, c.variant) for c in model.choices)
+        _, index, mean, deviation = self._evidence(members, {m: self.candidates[m].widths[0] for m in members})
+        names = [self.reduced.names[k] for k in index]
+        return replace(
+            model,
+            deviations=dict(zip(names, mean.tolist(), strict=True)),
+            spread=dict(zip(names, deviation.tolist(), strict=True)),
+        )
+
     def _usual(self, m: tuple[str, int]) -> float:
         widths = self.candidates[m].widths
         return widths[len(widths) // 2]
@@ -154,10 +167,12 @@ class Search:
         listed = sum(k in ("structural", "calibration") for k in kinds)
         forms, left = kinds.count("form"), kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
+        own = sum(v >= OTHER_FORM for _, v in members)
         if listed >= len(SIZE_PRIOR) or forms >= len(FORM_PRIOR):
             return -np.inf
         value = np.log(SIZE_PRIOR[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
+        value += own * np.log(OTHER_FORM_PRIOR) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search

@@ -3,22 +3,25 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..diagnosis.closure import Ladder, closed
+from ..diagnosis.closure import Ladder, closed, placebo, rms, rows
+from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import Bench, Fit, is_parameter
 from ..diagnosis.naming import Reading, read
-from ..diagnosis.search import Model
+from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
 from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..recording import Recording
 from .machine import FAULTS, ReferenceActuator
+from .next_recording import LIKELY, RIVALS, next_recordings
 from .signals import Signals, estimated_noise
 from .terms import TERMS
 
@@ -31,6 +34,34 @@ TOLD = 3.0  # standard deviations from nominal at which a controller's gain is t
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
 
 
+@dataclass(frozen=True)
+class Diagnosed:
+    """A verdict with the fit that it rests on."""
+
+    verdict: dict[str, Any]
+    bench: Bench
+    fit: Fit
+    reading: Reading
+    leading: Model
+    values: Mapping[str, float]  # of all parameters at the leading set's fit
+    noise: SensorNoise
+
+    def next_experiments(self) -> list[dict[str, Any]]:
+        """What to record next: see ``next_recordings``."""
+        listed = {u.id for u in self.bench.units if u.kind in ("structural", "calibration")}
+        mine = {u for u in self.leading.units if u in listed}
+        rivals: dict[tuple[str, ...], Model] = {}
+        for model in self.fit.models:
+            names = tuple(sorted(u for u in model.units if u in listed))
+            if set(names) != mine:
+                rivals.setdefault(names, model)
+        mass = {s: p for s, p, _ in self.reading.sets} | {(): self.reading.empty + self.reading.unknown}
+        likely = [(n, m) for n, m in rivals.items() if mass.get(n, 0.0) > LIKELY]
+        kept = (likely or list(rivals.items()))[:RIVALS]
+        effects = self.verdict["simulator"]["after"]
+        return next_recordings(self.bench, self.fit, self.leading, kept, self.values, effects, self.noise)
+
+
 def diagnose(
     name: str,
     recordings: Mapping[str, Recording],
@@ -39,8 +70,8 @@ def diagnose(
     noise: SensorNoise,
     exclude: Sequence[str] = (),
     processes: int = 1,
-) -> dict[str, Any]:
-    """The verdict on a bench, in the format of ``diagnosis.json``.
+) -> "Diagnosed":
+    """Diagnose a bench: its verdict, in the format of ``diagnosis.json``, and the fit that it rests on.
 
     Parameters
     ----------
@@ -65,7 +96,7 @@ def diagnose(
     reading = read(fit.models, fit.search.units.values(), tuple(machine.observed()))
     sealed = _seal(reading)
     if not confirm:
-        return _verdict(name, split, machine, bench, fit, reading, sealed, None, recordings)
+        return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own)
     # from here on the confirm recordings are open
     own = estimated_noise(list(recordings.values()), noise)
     whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
@@ -75,7 +106,7 @@ def diagnose(
     all_fit = every.fit(warm=True)
     final = read(all_fit.models, all_fit.search.units.values(), tuple(whole.observed()))
     ladder = Ladder(whole, confirm, every.parameters, all_fit.weights)
-    return _verdict(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings)
+    return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings, own)
 
 
 def _seal(reading: Reading) -> dict[str, Any]:
@@ -89,9 +120,9 @@ def _seal(reading: Reading) -> dict[str, Any]:
     return out | {"digest": hashlib.sha256(text.encode()).hexdigest()}
 
 
-def _verdict(
-    name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings
-) -> dict[str, Any]:
+def _diagnosed(
+    name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings, noise
+) -> Diagnosed:
     best = (
         reading.sets[0][2]
         if reading.sets and reading.named + tuple(g for q in reading.groups for g in q)
@@ -105,21 +136,28 @@ def _verdict(
         "recordings": {"explore": list(split[0]), "confirm": list(split[1])},
         "where": found,
     }  # fmt: skip
-    verdict["which"] = _which(bench, machine, reading, found)
+    verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
     verdict["discovered"] = _discovered(bench, reading, best)
     verdict["controller"] = _controller(bench, fit)
     verdict["groups"] = [list(g) for g in reading.groups]
-    before_point = _null_point(bench)
+    before_point, _ = _null_point(bench)
     spreads = _spreads(bench, fit, best)
     after_values = _values(bench, fit, best)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
-    verdict["shrinks"] = _shrinks(bench, held_out, best, before_point, recordings, verdict)
+    verdict["shrinks"] = _shrinks(bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"])
+    told = [
+        {**p, "name": n.split(".", 1)[-1]}
+        for entry in verdict["which"][:1]
+        for n, p in entry.get("parameters", {}).items()
+    ]
+    before = _simulator(bench, before_point, ())
+    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, told) if told else before}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
-    return verdict
+    return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)
 
 
 def _from_off(bench: Bench, model: Model) -> dict[str, float]:
@@ -175,7 +213,9 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
     return {n: (v, spread[n]) for n, v in values.items()}
 
 
-def _which(bench: Bench, machine: ReferenceActuator, reading: Reading, found: Sequence[Mapping]) -> list[dict]:
+def _which(
+    bench: Bench, machine: ReferenceActuator, reading: Reading, found: Sequence[Mapping], search: Search
+) -> list[dict]:
     """Sets with their probabilities and parameters, the empty set and the unknown; the verdict's own first."""
     grouped = {e for g in reading.groups for e in g}
     entries: list[dict[str, Any]] = []
@@ -184,7 +224,7 @@ def _which(bench: Bench, machine: ReferenceActuator, reading: Reading, found: Se
         entries.append(
             {
                 "effects": list(effects), "probability": p, "group": "group 1" if inside and reading.groups else None,
-                "parameters": _parameters(bench, machine, effects, model),
+                "parameters": _parameters(bench, machine, effects, search.wide(model)),
             }
         )  # fmt: skip
     rest = sum(p for _, p, _ in reading.sets[12:])
@@ -232,7 +272,7 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
         channel = form.split("_", 1)[1].replace("_", " of phase ")
         out.append(
             {
-                "equation": unit.equations[0], "along": "time", "form": kind,
+                "unit": form, "equation": unit.equations[0], "along": "time", "form": kind,
                 "probability": float(reading.inclusion[form]),
                 "closed": None, "another_form_of": None, "parameters": parameters, "recordings": list(bench.recordings),
                 "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
@@ -242,7 +282,7 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
         equation = left.split(":", 1)[1]
         out.append(
             {
-                "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
+                "unit": left, "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
                 "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
                 "parameters": {},
                 "recordings": list(bench.recordings),
@@ -268,14 +308,14 @@ def _controller(bench: Bench, fit: Fit) -> dict[str, dict]:
     return out
 
 
-def _null_point(bench: Bench) -> dict[str, float]:
-    """The recalibrated nominal model: the nuisances alone, on the same recordings."""
+def _null_point(bench: Bench) -> tuple[dict[str, float], Reduced]:
+    """The recalibrated nominal model: the nuisances alone, on the same recordings; and the log evidence there."""
     null = Bench(bench.machine, bench.recordings, bench.processes)
     null.weights = bench.weights
     for _ in range(2):
         normal = null.normal(null.linearise())
         null.move(Model((), 0.0, 0.0, {}, {}), normal)
-    return null.values()
+    return null.values(), null.reduce(null.normal(null.linearise()))
 
 
 def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
@@ -323,28 +363,76 @@ def _biased(vectors: Mapping[str, dict]) -> dict[str, float]:
     return out
 
 
-def _shrinks(bench: Bench, held_out, best: Model, before: Mapping, recordings, verdict) -> dict[str, Any]:
-    """The ladder on the confirm recordings."""
+def _shrinks(
+    bench: Bench, held_out, vectors: Mapping[str, dict], recordings: Mapping[str, Recording], found: list[dict]
+) -> dict[str, Any]:
+    """The ladder on the confirm recordings; enters what each described form closes alone."""
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
     ladder, explored, fit = held_out
     reading = read(fit.models, fit.search.units.values())
-    model = reading.sets[0][2] if reading.named else fit.models[0]
-    frozen_null = {**{n: p.off for n, p in bench.parameters.items()}, **_null_point(explored)}
-    frozen_after = {**frozen_null, **_values(explored, fit, model)}
-    nominal = {n: p.off for n, p in bench.parameters.items()}
-    for n in frozen_null:
-        if n in FAULTS or n.split("@")[0] in FAULTS:
-            nominal[n] = frozen_null[n]
-    rungs = {}
-    for rung, values in (("nominal", nominal), ("recalibrated", frozen_null), ("after", frozen_after)):
-        whites, _ = ladder.blocks(values)
-        rungs[rung] = (*ladder.rung(whites), whites)
-    recalibrated, rows, whites = rungs["recalibrated"]
-    after = rungs["after"][0]
-    size = sum(is_parameter(n) for n in model.deviations)
+    told = reading.named or reading.forms or reading.groups
+    model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
+    off = {n: p.off for n, p in bench.parameters.items()}
+    point, null = _null_point(explored)
+    recalibrated = {**off, **point}
+    after = {**recalibrated, **_values(explored, fit, model)} if told else recalibrated
+    nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
+    base = ladder.blocks(recalibrated, remainders=True)
+    best = ladder.blocks(after)
+    mine = [n for n in model.deviations if is_parameter(n)] if told else []
+    units = {u.id: u for u in explored.units}
+    equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
+    count = rows(base)
     signal = {
-        "nominal": rungs["nominal"][0], "recalibrated": recalibrated, "placebo": ladder.placebo(whites, size),
-        "after": after, "floor": 1.0, "closed": closed(recalibrated, after, 1.0, rows),
+        "nominal": rms(ladder.blocks(nominal)), "recalibrated": rms(base),
+        "placebo": placebo(null, base, equations, len(mine)), "after": rms(best), "floor": 1.0,
     }  # fmt: skip
-    return {"signal": signal, "features": None, "fault_vector": None}
+    signal["closed"] = closed(signal["recalibrated"], signal["after"], 1.0, count)
+    for entry in found:
+        form = units.get(entry["unit"])
+        if form is not None and form.id in model.units:
+            alone = {**recalibrated, **{p.name: after[p.name] for p in form.parameters}}
+            entry["closed"] = closed(signal["recalibrated"], rms(ladder.blocks(alone)), 1.0, count)
+    return {"signal": signal, "features": None, "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings)}
+
+
+def _blocks_of(equation: str) -> tuple[str, ...]:
+    """Blocks of an equation as the catalogue names it."""
+    return ("electrical_a", "electrical_b", "electrical_c") if equation == "electrical" else (equation,)
+
+
+def _fault_ladder(
+    confirm: Sequence[str], vectors: Mapping[str, dict], recordings: Mapping[str, Recording]
+) -> dict[str, float | None] | None:
+    """Root mean square error of the fault vector over its own uncertainty, where the truth is known."""
+    errors: dict[str, list[float]] = {"before": [], "after": []}
+    for name in confirm:
+        truth = recordings[name].fault
+        if truth is None:
+            continue
+        for stage, found in errors.items():
+            for value, (component, known) in zip(truth, vectors[name][stage].items(), strict=True):
+                sd = (vectors[name]["after"][component]["high"] - vectors[name]["after"][component]["low"]) / (2.0 * Z)
+                found.append((known["value"] - float(value)) / max(sd, 1e-9))
+    if not errors["before"]:
+        return None
+    before, after = (float(np.sqrt(np.mean(np.square(e)))) for e in errors.values())
+    return {
+        "nominal": before, "recalibrated": before, "placebo": None, "after": after, "floor": 1.0,
+        "closed": closed(before, after, 1.0, len(errors["before"])),
+    }  # fmt: skip
+
+
+def _simulator(bench: Bench, values: Mapping[str, float], found: Sequence[Mapping]) -> dict[str, dict[str, float]]:
+    """The unit's tolerances and named effects as parameters of the catalogue: effect -> parameter -> value."""
+    out: dict[str, dict[str, float]] = {}
+    for n in bench.nuisances:
+        if "@" not in n and "." in n and n.split(".")[0] in EFFECTS:
+            effect, name = n.split(".", 1)
+            out.setdefault(effect, {})[name] = float(values[n])
+    for p in found:
+        effect = p["effect"]
+        if p["name"] in EFFECTS[effect].parameters:
+            out.setdefault(effect, {})[p["name"]] = float(p["value"])
+    return out

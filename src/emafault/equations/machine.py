@@ -24,6 +24,7 @@ SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
+OUTSIDE = 3.0  # tolerances, that a unit named for its calibration lies beyond what is usual
 PER_PHASE = ("a", "b", "c")
 
 
@@ -37,6 +38,7 @@ class ReferenceActuator:
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
         self._along: dict[tuple[str, str], dict[str, np.ndarray]] = {}
+        self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
         self.parameters = self._nuisances()
         self.units = [self._unit(e) for e in self.effects.values() if e.id != "speed_quantisation"]
@@ -115,7 +117,8 @@ class ReferenceActuator:
                 parameters.append(
                     Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off))
                 )
-            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters)])
+            least = min(OUTSIDE * self.parameters[p.alias or ""].sd / p.sd for p in parameters)
+            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), least)])
         internal = _internal(effect)
         for name, q in internal.items():
             full = f"{effect.id}.{name}"

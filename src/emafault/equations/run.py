@@ -6,25 +6,45 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jsonschema
+
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
+from ..faults import FAULT_NAMES
+from ..figures import gap as figures
 from ..figures.page import Page
 from ..gap.bench import read_bench, split_bench
+from ..gap.handover import experiment_text, write_experiment
+from ..gap.retrained import MARKS, section
+from ..gap.run import EXPERIMENT, REPORT, VERDICT, file_name, log_diagnosis, results_folder, to_json
 from ..recording import replace_atomically
 from .diagnose import TELLING, TOLD, diagnose
 from .terms import TERMS
 
-VERDICT, REPORT = "diagnosis.json", "report.html"
+SCHEMA_FILE = Path(__file__).with_name("verdict.schema.json")
+PROCESSES = 2
+SHOWN = 4  # fault vectors in the picture
+OPEN = 0.05  # probability from which an effect that is not named is worth a line
 MOST = 8  # sets in the table
 
 
-def diagnose_folder(path: str | Path, spec: Mapping[str, Any], out: str | Path, exclude: Sequence[str] = ()) -> dict:
-    """Diagnose a folder of recordings and write ``diagnosis.json`` and ``report.html`` to ``out``.
+def diagnose_folder(
+    path: str | Path,
+    spec: Mapping[str, Any],
+    out: str | Path | None = None,
+    exclude: Sequence[str] = (),
+    experiment: str | Path | None = None,
+    track: bool = True,
+) -> dict:
+    """Diagnose a folder of recordings; write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
     Parameters
     ----------
-    spec : ``actuator`` and ``sensors`` of a composed configuration
+    spec : ``actuator``, ``sensors`` and ``tracking`` of a composed configuration
+    out : folder to write to; None takes ``results/diagnoses/<name of the bench>``
     exclude : effects that the library is to lack
+    experiment : file that receives the fix as an experiment, besides the one among the results
+    track : whether to log an MLflow run; one that fails is said so and breaks nothing
 
     Raises
     ------
@@ -32,15 +52,26 @@ def diagnose_folder(path: str | Path, spec: Mapping[str, Any], out: str | Path, 
     """
     actuator = ActuatorParameters(**spec["actuator"])
     bench = read_bench(path, actuator)
+    folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
     split = split_bench(bench.recordings)
-    verdict = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude)
+    found = diagnose(
+        bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES
+    )
+    verdict = found.verdict
     verdict["warnings"] = bench.warnings
-    folder = Path(out)
-    text = json.dumps(verdict, indent=1, allow_nan=False, default=float) + "\n"
-    replace_atomically(folder / VERDICT, lambda temporary: temporary.write_text(text, encoding="utf-8"))
     print("\n".join(finding(verdict)), flush=True)
-    _page(verdict).write(folder / REPORT)
+    verdict["next_experiment"] = found.next_experiments()
+    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
+    written = to_json(verdict)
+    jsonschema.validate(json.loads(written), json.loads(SCHEMA_FILE.read_text()))
+    for target, content in ((folder / VERDICT, written), (folder / EXPERIMENT, text)):
+        replace_atomically(target, lambda temporary, content=content: temporary.write_text(content, encoding="utf-8"))
+    if experiment is not None:
+        write_experiment(Path(experiment), text)
+    _page(verdict, {n: r.fault for n, r in bench.recordings.items()}, section(folder, verdict)).write(folder / REPORT)
     print(f"written to {folder}", flush=True)
+    if track:
+        log_diagnosis(spec["tracking"], folder, verdict)
     return verdict
 
 
@@ -86,33 +117,39 @@ def _fitted(entry: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _page(verdict: Mapping[str, Any]) -> Page:
+def _page(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) -> Page:
     """The page of one diagnosis."""
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):
         page.paragraph(sentence, "lead")
-    page.heading("Residual by equation and operating region")
+    page.heading("What these recordings cannot tell")
+    page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
+    page.heading("Where: residual by equation and operating region")
     rows = [
         [
-            w["equation"],
-            w["along"].replace("_", " "),
-            f"{w['from']:.3g} to {w['to']:.3g}",
-            f"{w['z']:.3g}",
-            f"{w['share']:.1%}",
+            w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}",
+            f"{w['z']:.3g}", f"{w['share']:.1%}",
         ]
         for w in verdict["where"]
-    ]
+    ]  # fmt: skip
     page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
-    page.heading("Posterior probability")
+    page.heading("Which: posterior probability")
+    page.figure("which", figures.draw_ranking(_ranked(verdict)), "Probabilities are exclusive and sum to one.")
     rows = [
-        [
-            " + ".join(e["effects"]).replace("_", " ") or "no effect",
-            f"{e['probability']:.4f}",
-            _fitted(e) if e.get("parameters") else "",
-        ]
+        [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
         for e in verdict["which"][:MOST]
+        if e.get("parameters")
     ]
-    page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
+    if rows:
+        page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
+    if any(verdict["shrinks"].values()):
+        page.heading("How far the gap shrinks")
+        page.figure(
+            "how_far",
+            figures.draw_ladder(verdict["shrinks"]),
+            "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: the unit's tolerances fitted. "
+            "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
+        )
     page.heading("Controller")
     rows = [
         [
@@ -125,25 +162,70 @@ def _page(verdict: Mapping[str, Any]) -> Page:
         for n, g in verdict["controller"].items()
     ]
     page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
-    page.heading("Fault vector")
-    rows = []
-    for name, stages in verdict["fault_vector"].items():
-        for component, after in stages["after"].items():
-            before = stages["before"][component]
-            rows.append(
-                [
-                    f"{name}: {component}",
-                    f"{before['value']:.4g}",
-                    f"{after['value']:.4g}",
-                    f"{after['low']:.4g} to {after['high']:.4g}",
-                ]
-            )
-    page.table(["component", "nominal model recalibrated", "with what was found", "90 % interval"], rows)
-    signal = verdict["shrinks"]["signal"]
-    if signal:
-        page.heading("On the confirming recordings")
-        names = ("nominal", "recalibrated", "placebo", "after", "floor")
-        page.table(["model", "root mean square of the whitened residual"], [[n, f"{signal[n]:.4f}"] for n in names])
+    if verdict["fault_vector"]:
+        page.heading("Fault vector before and after")
+        page.figure(
+            "faults",
+            figures.draw_faults(_faults(verdict, truths)),
+            "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
+        )
+    page.parts.append(f"{MARKS[0]}{retrained}{MARKS[1]}")
+    page.heading("What to record next")
+    rows = [
+        [
+            e["command"], f"{e['ambient_temperature']:g} °C",
+            " from ".join(s.replace("_", " ").replace("+", " + ") for s in e["separates"]), f"{e['expected_odds']:.3g}",
+        ]
+        for e in verdict["next_experiment"]
+    ]  # fmt: skip
+    page.table(["command", "soak", "would tell", "expected odds"], rows)
     page.heading("Sealed before the confirming recordings were opened")
     page.parts.append(f"<pre>{html.escape(json.dumps(verdict['sealed'], indent=1))}</pre>")
     return page
+
+
+def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Entries of the picture of probabilities."""
+    named = verdict["verdict"] in ("explained", "group", "partly")
+    out = []
+    for m, entry in enumerate(verdict["which"][:MOST]):
+        unknown = entry["effects"] == ["unknown"]
+        kind = "unknown" if unknown else "rival" if entry["effects"] else "empty"
+        if kind == "rival" and named and (m == 0 or entry.get("group")):
+            kind = "named"
+        label = " + ".join(e.replace("_", " ") for e in entry["effects"])
+        if unknown:
+            label = f"none of the library ({entry['equation'].replace('_', ' ')})"
+        out.append(
+            {
+                "label": label or "no gap", "probability": entry["probability"], "kind": kind, "gain": None,
+                "group": entry.get("group"),
+            }
+        )  # fmt: skip
+    return out
+
+
+def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
+    """What is left open: groups, and listed effects neither named nor ruled out."""
+    out = [f"{' or '.join(g).replace('_', ' ')}: one of them acts" for g in verdict["groups"]]
+    grouped = {e for g in verdict["groups"] for e in g}
+    named = set(verdict["which"][0]["effects"])
+    for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
+        if OPEN < p < 0.9 and effect not in grouped | named:
+            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+    return out or ["No listed effect is left between named and ruled out."]
+
+
+def _faults(verdict: Mapping[str, Any], truths: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the picture of the fault vector, recordings of one fault together."""
+    groups: dict[tuple, dict[str, Any]] = {}
+    for name, entry in verdict["fault_vector"].items():
+        key = tuple(round(entry["after"][c]["value"], 9) for c in FAULT_NAMES[:5])
+        truth = truths.get(name)
+        known = {c: float(truth[m]) for m, c in enumerate(FAULT_NAMES)} if truth is not None else {}
+        group = groups.setdefault(key, {**entry, "label": name, "truth": known, "more": -1})
+        group["more"] += 1
+    for group in groups.values():
+        if group["more"]:
+            group["label"] += f"\nand {group['more']} more"
+    return list(groups.values())[:SHOWN]

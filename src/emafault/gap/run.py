@@ -77,7 +77,7 @@ def diagnose_path(
         cases = {name: diagnose_bench(path, spec, exclude)}
     else:
         cases = diagnose_measured(path, twin, exclude)
-    folders = {case: folder if len(cases) == 1 else folder / _file_name(case) for case in cases}
+    folders = {case: folder if len(cases) == 1 else folder / file_name(case) for case in cases}
     for case, found in cases.items():
         write_verdict(folders[case], found)
         if found.experiment and experiment is not None:
@@ -96,7 +96,7 @@ def diagnose_path(
     print(f"written to {folder}", flush=True)
     if track:
         for case, found in cases.items():
-            _track(spec["tracking"], folders[case], found.verdict)
+            log_diagnosis(spec["tracking"], folders[case], found.verdict)
     return {case: found.verdict for case, found in cases.items()}
 
 
@@ -177,7 +177,7 @@ def diagnose_recordings(
         if best is not None
         else verdict["simulator"]["before"]
     )
-    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{_file_name(bench.name)}")
+    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
     return Diagnosed(found, truths, worst_region(found), text, {n: _label(n, r) for n, r in recordings.items()})
 
 
@@ -259,7 +259,7 @@ def _write(path: Path, text: str) -> None:
     replace_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
-def _file_name(text: str) -> str:
+def file_name(text: str) -> str:
     """Text as the name of a file and of an experiment."""
     kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
     return kept.lstrip("_-") or "bench"
@@ -269,12 +269,12 @@ def _write_contents(folder: Path, name: str, cases: Sequence[str]) -> None:
     from ..figures.page import Page
 
     page = Page(f"Diagnoses of {name}")
-    links = "".join(f'<li><a href="{_file_name(c)}/{REPORT}">{c}</a></li>' for c in cases)
+    links = "".join(f'<li><a href="{file_name(c)}/{REPORT}">{c}</a></li>' for c in cases)
     page.parts.append(f"<ul>{links}</ul>")
     page.write(folder / REPORT)
 
 
-def _track(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
+def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
     """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
     from ..tracking import Entry, log_run
 
