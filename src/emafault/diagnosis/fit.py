@@ -209,7 +209,7 @@ class Bench:
         chosen: dict[str, dict[str, float]] = {}
         for model in search.ranked():
             for choice in model.choices:
-                if len(chosen) < CARRYING and self._kind(choice.unit) != "remainder" and choice.unit not in chosen:
+                if len(chosen) < CARRYING and self._kind(choice.unit) == "structural" and choice.unit not in chosen:
                     names = self.names_of(choice)
                     chosen[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
         self.sizes = chosen
