@@ -371,22 +371,21 @@ class Bench:
             self.point[own.name] = own.off + (at - own.off) * amount if first else at
             first = False
 
-    def fit(self, warm: bool = False) -> Fit:
-        """Search and relinearise until the leading set stands still; ``warm`` begins at the point as it is."""
-        whites = self.linearise()
-        normal = self.normal(whites)
-        # the unit first: its nuisances move the point before anything is compared
-        for _ in range(1 if warm else FIRST):
-            if not warm:
-                self.move(Model((), 0.0, 0.0, {}, {}), normal)
+    def fit(self, begun: "Bench | None" = None) -> Fit:
+        """Search and relinearise until the leading set stands still; ``begun`` at where another bench of the unit ended."""
+        if begun is None:
+            # the unit first: its nuisances move the point before anything is compared
+            for renewed in (False, *[True] * (FIRST - 1)):
+                self.move(Model((), 0.0, 0.0, {}, {}), self.normal(self.linearise(renew=renewed)))
             whites = self.linearise(renew=True)
-            normal = self.normal(whites)
-        # what no one has described comes last: it would take up what only a better point explains
-        whites, normal, search = self._until_still(whites, normal, FIRST, False)
-        self._carry_own_forms(search)
+            # what no one has described comes last: it would take up what only a better point explains
+            whites, normal, search = self._until_still(whites, self.normal(whites), FIRST, False)
+            self._carry_own_forms(search)
+        else:
+            self.point |= {n: v for n, v in begun.point.items() if n in self.point}
+            self.on, self.sizes, self.closer = set(begun.on), dict(begun.sizes), dict(begun.closer)
         whites = self.linearise(renew=True)
-        normal = self.normal(whites)
-        whites, normal, search = self._until_still(whites, normal, ROUNDS)
+        whites, normal, search = self._until_still(whites, self.normal(whites), ROUNDS)
         for _ in range(LEAVES):
             if not self._leave_out(search):
                 break

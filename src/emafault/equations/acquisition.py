@@ -66,7 +66,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
         for j in range(3):
             i = undone(p, "current", source[:, j], rec.size)
             drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
-            i = i - drift * share
+            i = i - drift * share - p(f"rounded.{'abc'[j]}@{rec.name}")
             for q in range(3):
                 if q != j:
                     i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]

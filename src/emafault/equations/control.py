@@ -17,6 +17,7 @@ from .terms import with_hook
 
 BLOCK = 2e-3  # s
 AVERAGED = 1e-2  # s
+USUAL_DELAY = 1e-4  # s
 NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
@@ -83,6 +84,15 @@ def _centred(x: np.ndarray, h: float, lead: float) -> np.ndarray:
 def _blocks(x: np.ndarray, width: int) -> np.ndarray:
     count = len(x) // width
     return np.diff(x[: count * width].reshape(count, width).mean(axis=1))
+
+
+def late(state: State) -> np.ndarray:
+    """(block,) what a demand that is ``USUAL_DELAY`` late leaves, in units of the noise; of the current that flows."""
+    rec = state.rec
+    width = block_length(rec)
+    level = 0.5 * np.abs(rec.current).sum(axis=1) * np.sign(state.drive)
+    rate = np.gradient(uniform_filter1d(level, max(1, round(BLOCK / rec.interval)), mode="nearest"), rec.interval)
+    return USUAL_DELAY * _blocks(rate, width) / np.sqrt(noise_bands(state)[0])
 
 
 def usable(state: State) -> np.ndarray:

@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..recording import Recording
 from .machine import FAULTS, ReferenceActuator
+from .quality import told
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .signals import Signals, estimated_noise
 from .terms import TERMS
@@ -101,9 +102,7 @@ def diagnose(
     own = estimated_noise(list(recordings.values()), noise)
     whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
     every = Bench(whole, list(recordings), processes)
-    begun = every.point | {n: v for n, v in bench.point.items() if n in every.point}
-    every.point, every.on = begun, set(bench.on)
-    all_fit = every.fit(warm=True)
+    all_fit = every.fit(bench)
     final = read(all_fit.models, all_fit.search.units.values(), tuple(whole.observed()))
     ladder = Ladder(whole, confirm, every.parameters, all_fit.weights)
     return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings, own)
@@ -139,7 +138,7 @@ def _diagnosed(
     verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
-    verdict["discovered"] = _discovered(bench, reading, best)
+    verdict["discovered"] = [*told(recordings), *_discovered(bench, reading, best)]
     verdict["controller"] = _controller(bench, fit)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point, _ = _null_point(bench)

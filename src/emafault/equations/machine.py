@@ -90,6 +90,10 @@ class ReferenceActuator:
             out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
             full = f"controller.timing@{name}"
             out[full] = Parameter(full, 0.0, 0.0, TIMING * (rec.interval + a.control_period), "s")
+            if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
+                for j in PER_PHASE:
+                    full = f"rounded.{j}@{name}"
+                    out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
             for j in PER_PHASE:
                 full = f"controller.edge_{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
@@ -283,17 +287,20 @@ class ReferenceActuator:
 
         if equation == "control":
             width = control.block_length(rec)
-            rows = (np.arange(rec.size // width - 1) + 1) * width
+            blocks = (np.arange(rec.size // width - 1) + 1) * width
             phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
-            of = rows_at(rows)
+            of = rows_at(blocks)
         elif equation == "commutation":
             of = rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
         elif equation.startswith("electrical") and rec.current_end is None:
             of = electrical.averaging(state, "abc".index(equation[-1]))
+        rows = [of(d) for d in drivers]
+        if equation == "control":
+            rows.append(control.late(state))
         return {
             **{k: of(v) for k, v in base.items()},
             "phi": np.array([of(f) for f in phi]),
-            "drivers": np.array([of(d) for d in drivers]),
+            "drivers": np.array(rows),
             "slow": SLOW_FUNCTIONS,
         }
 

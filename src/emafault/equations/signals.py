@@ -70,6 +70,7 @@ class Signals:
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
         self.speed_step = lattice_step(self.speed_recorded)
+        self.current_step = max(lattice_step(x) for x in self.current.T)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
         self.dT: Any = self.dT_measured  # with its derivative once a point is known
@@ -94,7 +95,7 @@ class Signals:
             more(self.speed_recorded, s.speed), more(self.angle, s.angle), more(self.output, s.position), self.command,
             bus, self.ambient, self.health, s,
         )  # fmt: skip
-        out.speed_step = self.speed_step
+        out.speed_step, out.current_step = self.speed_step, self.current_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
         return out
 
@@ -105,15 +106,22 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     The angle's is taken of the most finely sampled recordings, that of the end currents where a phase floats.
     """
 
-    def robust(parts: list[np.ndarray]) -> float:
+    def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
         x = np.concatenate(parts) if parts else np.zeros(0)
-        return float(np.median(np.abs(x - np.median(x))) / 0.6745) if len(x) > 50 else np.inf
+        if len(x) < 50:
+            return np.inf
+        x = x - np.median(x)
+        scale = float(np.median(np.abs(x)) / 0.6745)
+        if step > 0.0:  # most of what lies on a lattice may be one value
+            return float(np.sqrt(np.mean(x[np.abs(x) < 4.0 * max(scale, step)] ** 2)))
+        return scale
 
     finest = min(r.interval for r in recordings)
     fine = [r for r in recordings if r.interval < 1.5 * finest]
     angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
     current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
     ends: list[np.ndarray] = []
+    step = max(lattice_step(r.phase_current[:, 0]) for r in recordings)
     for r in recordings:
         for j in range(3):
             off = np.abs(r.phase_current[:, j]) < 4.0 * current
@@ -121,7 +129,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             if r.phase_current_end is not None and still.sum() > 20:
                 x = r.phase_current_end[:, j] - r.phase_current_end.mean(axis=1)
                 ends.append(x[still] - np.median(x[still]))
-    limits = {"angle": angle, "current": current, "current_end": robust(ends) / np.sqrt(2.0 / 3.0)}
+    limits = {"angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(2.0 / 3.0)}
     return replace(
         nominal,
         **{
