@@ -25,7 +25,7 @@ def bench(effects=None, actuator=ACTUATOR):
 
 def verdict_of(recordings, **options):
     names = list(recordings)
-    return diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, **options)
+    return diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, **options).verdict
 
 
 COGGING = {"cogging": {"a": 0.004}}

@@ -21,7 +21,9 @@ def written(tmp_path_factory, shop):
     folder = tmp_path_factory.mktemp("magnets")
     for name, recording in shop.make_bench(EFFECT).items():
         write_recording(folder / "bench" / name, recording)
-    code = main(["diagnose", str(folder / "bench"), "--out", str(folder / "out"), "--no-tracking"])
+    code = main(
+        ["diagnose", str(folder / "bench"), "--by", "simulation", "--out", str(folder / "out"), "--no-tracking"]
+    )
     assert code == 0
     return folder
 
@@ -87,7 +89,8 @@ def test_identical_input_gives_identical_results(written, verdict):
 
 def test_the_effect_left_out_of_the_library_is_not_named(written):
     out = written / "without"
-    assert main(["diagnose", str(written / "bench"), "--out", str(out), "--no-tracking", "--exclude", *EFFECT]) == 0
+    command = ["diagnose", str(written / "bench"), "--by", "simulation", "--out", str(out), "--no-tracking"]
+    assert main([*command, "--exclude", *EFFECT]) == 0
     verdict = json.loads((out / "diagnosis.json").read_text())
     assert all("magnet_temperature" not in e["effects"] for e in verdict["which"])
 

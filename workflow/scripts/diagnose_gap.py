@@ -2,9 +2,14 @@
 
 from pathlib import Path
 
+from emafault.equations.run import diagnose_folder
 from emafault.gap.run import diagnose_path
 from emafault.progress import one_line_errors
 
 with one_line_errors(snakemake.log[0]):
     params = snakemake.params
-    diagnose_path(params.bench, params.spec, out=Path(snakemake.output.verdict).parent, twin=params.twin)
+    out = Path(snakemake.output.verdict).parent
+    if params.twin == "actuator":
+        diagnose_folder(params.bench, params.spec, out)
+    else:
+        diagnose_path(params.bench, params.spec, out=out, twin=params.twin)

@@ -24,8 +24,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--by",
         choices=("simulation", "equations"),
-        default="simulation",
-        help="compare with simulated recordings, or by the equations at the measured signals (simulation)",
+        help="by the equations at the measured signals, or against simulated recordings, the only way for a measured "
+        "machine (equations)",
     )
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
@@ -38,6 +38,7 @@ def run(args: argparse.Namespace) -> None:
     InputError : recordings, a twin or a setting that cannot be used
     """
     from .. import config
+    from ..equations.run import diagnose_folder
     from ..errors import InputError
     from ..gap.run import diagnose_path
 
@@ -47,24 +48,13 @@ def run(args: argparse.Namespace) -> None:
             raise InputError(f"--experiment: got '{args.experiment}', accepted are letters, digits, _ and -")
         target = config.CONF / "experiment" / f"{args.experiment}.yaml"
     spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
-    if args.by == "equations":
-        _by_equations(args, spec)
-        return
     tracking = not args.no_tracking
-    diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
+    by = args.by or ("equations" if args.twin == "actuator" else "simulation")
+    if by == "equations":
+        if args.twin != "actuator":
+            raise InputError(f"--by equations: the twin '{args.twin}' has none; accepted is --by simulation")
+        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking)
+    else:
+        diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
     if target is not None:
         print(f"snakemake --cores all --config experiment={Path(target).stem}")
-
-
-def _by_equations(args: argparse.Namespace, spec) -> None:
-    """Diagnose by equation errors; the folder and its files are named as those of the other way."""
-    from ..equations.run import diagnose_folder
-    from ..errors import InputError
-    from ..gap.run import results_folder
-
-    if args.twin != "actuator" or args.experiment:
-        raise InputError("--by equations: is for recordings of the actuator, without --twin and --experiment")
-    path = Path(args.path)
-    name = path.resolve().name if path.is_dir() else path.stem
-    out = Path(args.out) if args.out else results_folder() / "diagnoses" / name
-    diagnose_folder(path, spec, out, args.exclude)

@@ -25,7 +25,7 @@ class Ladder:
         self.machine, self.recordings, self.parameters, self.weights = machine, list(recordings), parameters, weights
 
     def blocks(self, values: Mapping[str, float], remainders: bool = False) -> list[White]:
-        """Whitened blocks at frozen values, what is each recording's own refitted; with columns of remainders if asked."""
+        """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked."""
         out: list[White] = []
         for recording in self.recordings:
             free = [n for n in own(list(self.parameters), recording) if n in values]

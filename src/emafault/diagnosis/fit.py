@@ -7,8 +7,19 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal, Reduced, marginalise
-from .forked import forked
-from .linear import OWN_FORM, Weights, White, assemble, compressed, correct, full_model, key_of, weights_from, white_rows
+from .forked import Workers
+from .linear import (
+    OWN_FORM,
+    Weights,
+    White,
+    assemble,
+    compressed,
+    correct,
+    full_model,
+    key_of,
+    weights_from,
+    white_rows,
+)
 from .model import Parameter, Unit, Variant
 from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
@@ -52,6 +63,35 @@ class _Task:
     own: Mapping[str, Mapping[str, float]]
 
 
+def _compress(
+    machine, task: _Task, recording: str, weights: dict[tuple[str, str], Weights]
+) -> tuple[list[White], dict[tuple[str, str], Weights]]:
+    """Normal matrices of a recording's blocks, and their weights where a full model renews them."""
+    only = set(task.wanted) if task.only else None
+    blocks = machine.blocks(task.values, recording, wanted=only)
+    again: Sequence = [None] * len(blocks)
+    if task.corrected:
+        again = machine.blocks(task.values, recording, disturbed=True, wanted=only)
+    parts = [
+        white_rows(
+            b, task.wanted, task.remainders is None or b.equation in task.remainders,
+            task.own if b.equation not in SETTINGS else None,
+        )
+        for b in blocks
+    ]  # fmt: skip
+    renewed: dict[tuple[str, str], Weights] = {}
+    if task.full is not None:
+        renewed = {key_of(b): weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
+    weights = weights | renewed
+    out = []
+    for block, other, part in zip(blocks, again, parts, strict=True):
+        white = compressed(block, *part, weights.get(key_of(block)))
+        if other is not None:
+            correct(white, block, other, weights.get(key_of(block)))
+        out.append(white)
+    return out, renewed
+
+
 class Bench:
     """Recordings of one machine under one linearised model.
 
@@ -81,6 +121,7 @@ class Bench:
             if p.alias is not None:
                 self._beyond.setdefault(p.alias, []).append(n)
         self.corrected = True
+        self.workers: Workers | None = None
         self.remainders: dict[str, Unit] = {}
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
         self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
@@ -135,7 +176,7 @@ class Bench:
         """Mean and standard deviation of deviations with everything free, an alias's width added to its quantity's."""
         out = {n: self.prior(n)[:2] for n in self.nuisances}
         for n in columns:
-            mean, sd, _ = self.prior(n)
+            sd = self.prior(n)[1]
             own = aliases.get(n, n)
             before = out.get(own, (0.0, 0.0))
             # in the full model an effect has the prior's width around where it is
@@ -143,42 +184,17 @@ class Bench:
         return out
 
     def _each(self, task: "_Task") -> list[White]:
-        """A task done for every recording, side by side where there are processes for it; takes renewed weights over."""
-        if self.processes > 1 and len(self.recordings) > 1:
-            for name in self.recordings:
+        """A task done for every recording, side by side where there are processes; takes renewed weights over."""
+        if self.workers is None:
+            several = min(self.processes, len(self.recordings))
+            for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
-            found = forked(lambda name: self._compress(task, name), self.recordings, self.processes)
-        else:
-            found = [self._compress(task, name) for name in self.recordings]
+            self.workers = Workers(self, self.machine, several)
+        mine = [{k: w for k, w in self.weights.items() if k[0] == n} for n in self.recordings]
+        found = self.workers.map(_compress, list(zip([task] * len(mine), self.recordings, mine, strict=True)))
         for _, renewed in found:
             self.weights |= renewed
         return [w for whites, _ in found for w in whites]
-
-    def _compress(self, task: "_Task", recording: str) -> tuple[list[White], dict[tuple[str, str], Weights]]:
-        only = set(task.wanted) if task.only else None
-        blocks = self.machine.blocks(task.values, recording, wanted=only)
-        again: Sequence = [None] * len(blocks)
-        if task.corrected:
-            again = self.machine.blocks(task.values, recording, disturbed=True, wanted=only)
-        parts = [
-            white_rows(
-                b, task.wanted, task.remainders is None or b.equation in task.remainders,
-                task.own if b.equation not in SETTINGS else None,
-            )
-            for b in blocks
-        ]  # fmt: skip
-        weights = {key_of(b): self.weights.get(key_of(b)) for b in blocks}
-        renewed: dict[tuple[str, str], Weights] = {}
-        if task.full is not None:
-            renewed = {key_of(b): weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
-        weights |= renewed
-        out = []
-        for block, other, part in zip(blocks, again, parts, strict=True):
-            white = compressed(block, *part, weights[key_of(block)])
-            if other is not None:
-                correct(white, block, other, weights[key_of(block)])
-            out.append(white)
-        return out, renewed
 
     def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
         """Equation, (row,) what deviations add to each block in units of its noise, and what its rows lie along."""
@@ -372,7 +388,7 @@ class Bench:
             first = False
 
     def fit(self, begun: "Bench | None" = None) -> Fit:
-        """Search and relinearise until the leading set stands still; ``begun`` at where another bench of the unit ended."""
+        """Search and relinearise until the leading set stands still; ``begun``: another bench of the unit, fitted."""
         if begun is None:
             # the unit first: its nuisances move the point before anything is compared
             for renewed in (False, *[True] * (FIRST - 1)):

@@ -1,27 +1,37 @@
 """A function of recordings done in forked processes, which share what has been read without a copy."""
 
 import multiprocessing
+import weakref
 from collections.abc import Callable, Sequence
 
-_task: Callable | None = None
+_shared: object = None
 
 
-def _done(name: str):
-    assert _task is not None
-    return _task(name)
+def _begin(shared: object) -> None:
+    global _shared
+    _shared = shared
 
 
-def forked(task: Callable[[str], object], names: Sequence[str], processes: int) -> list:
-    """Results of ``task`` by name, in the order of ``names``; processes live as long as the call.
+def _done(call: tuple[Callable, tuple]):
+    task, arguments = call
+    return task(_shared, *arguments)
 
-    Where processes cannot be forked they are done one after the other.
+
+class Workers:
+    """Processes that live as long as their owner; ``shared`` is theirs from the fork on.
+
+    Where processes cannot be forked everything is done here.
     """
-    global _task
-    if "fork" not in multiprocessing.get_all_start_methods():
-        return [task(n) for n in names]
-    _task = task
-    try:
-        with multiprocessing.get_context("fork").Pool(min(processes, len(names))) as pool:
-            return pool.map(_done, names, chunksize=1)
-    finally:
-        _task = None
+
+    def __init__(self, owner: object, shared: object, processes: int):
+        self.shared = shared
+        self.pool = None
+        if processes > 1 and "fork" in multiprocessing.get_all_start_methods():
+            self.pool = multiprocessing.get_context("fork").Pool(processes, _begin, (shared,))
+            weakref.finalize(owner, self.pool.terminate)
+
+    def map(self, task: Callable, arguments: Sequence[tuple]) -> list:
+        """Results of ``task(shared, *arguments)`` in order; ``task`` is a function of a module."""
+        if self.pool is None:
+            return [task(self.shared, *a) for a in arguments]
+        return self.pool.map(_done, [(task, a) for a in arguments], chunksize=1)

@@ -62,8 +62,8 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
 
 
 def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
-    """What a unit of these amounts adds to a block, times functions of the coordinates: its own form in so far as it is not
-    the library's."""
+    """What a unit of these amounts adds to a block, times functions of the coordinates: its form where that is not the
+    library's."""
     parts = [amount * np.asarray(block.columns[n]) for n, amount in amounts.items() if n in block.columns]
     added = np.broadcast_to(sum(parts, np.zeros(1)), len(block.residual))
     if np.sum(added[block.usable] ** 2 / block.bands[0][block.usable]) < SEEN:
@@ -75,8 +75,8 @@ def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[
 def white_rows(
     block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
 ) -> tuple[list[str], np.ndarray]:
-    """A block's columns ``wanted`` that act in it, with its remainder's and units' own forms, and its residual last: names
-    without that of the residual, and (row, column) divided by the noise's covariance."""
+    """A block's columns ``wanted`` that act in it, with its remainder's and units' own forms, and its residual last:
+    names without that of the residual, and (row, column) divided by the noise's covariance."""
     names = [n for n in wanted if n in block.columns]
     count = len(block.residual)
     columns = [np.broadcast_to(block.columns[n], count) for n in names]

@@ -10,8 +10,8 @@ import numpy as np
 class Parameter:
     """One parameter: value at which it does nothing, prior mean and standard deviation where it is free.
 
-    A parameter that multiplies (``vanishes``: where its factor is zero) deviates in the logarithm of its factor, so that
-    a product of two keeps its value along the line on which one makes up for the other.
+    A parameter that multiplies (``vanishes``: where its factor is zero) deviates in the logarithm of its factor, so
+    that a product of two keeps its value along the line on which one makes up for the other.
     """
 
     name: str

@@ -84,8 +84,8 @@ def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, varia
 def _without_dips(r: np.ndarray) -> np.ndarray:
     """Autocovariances (lag,) of a spectrum that is nowhere below its median.
 
-    A model that fits, or a difference that is none, digs holes into the spectrum of what is left; taken for noise that is
-    quieter there, they would make a bias at these frequencies look significant.
+    A model that fits, or a difference that is none, digs holes into the spectrum of what is left; taken for noise that
+    is quieter there, they would make a bias at these frequencies look significant.
     """
     k = np.arange(len(r))
     w = (np.arange(GRID) + 0.5) * np.pi / GRID

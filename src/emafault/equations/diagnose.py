@@ -11,7 +11,6 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, placebo, rms, rows
-from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import Bench, Fit, is_parameter
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model, Search
@@ -21,8 +20,8 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..recording import Recording
 from .machine import FAULTS, ReferenceActuator
-from .quality import told
 from .next_recording import LIKELY, RIVALS, next_recordings
+from .quality import told
 from .signals import Signals, estimated_noise
 from .terms import TERMS
 
@@ -139,21 +138,21 @@ def _diagnosed(
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
     verdict["discovered"] = [*told(recordings), *_discovered(bench, reading, best)]
-    verdict["controller"] = _controller(bench, fit)
+    verdict["controller"] = _controller(bench, fit, reading)
     verdict["groups"] = [list(g) for g in reading.groups]
-    before_point, _ = _null_point(bench)
+    before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
     after_values = _values(bench, fit, best)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
     verdict["shrinks"] = _shrinks(bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"])
-    told = [
+    fitted = [
         {**p, "name": n.split(".", 1)[-1]}
         for entry in verdict["which"][:1]
         for n, p in entry.get("parameters", {}).items()
     ]
     before = _simulator(bench, before_point, ())
-    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, told) if told else before}
+    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if fitted else before}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
     return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)
@@ -291,12 +290,14 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
     return out
 
 
-def _controller(bench: Bench, fit: Fit) -> dict[str, dict]:
+def _controller(bench: Bench, fit: Fit, reading: Reading) -> dict[str, dict]:
     """The controller's gains as fitted in the control equation."""
     index = fit.normal.index
-    n = [x for x in bench.nuisances if x.startswith("controller.") and "@" not in x]
+    n = [x for x in bench.nuisances if x.startswith("controller.")]
+    if "remainder:control" in reading.remainders:  # which may stand in for a gain
+        n += [x for x in index if x.startswith("remainder.control.")]
     k = np.array([index[x] for x in n])
-    prior = np.array([1.0 / bench.parameters[x].sd ** 2 for x in n])
+    prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
     covariance = np.linalg.inv(fit.normal.H[np.ix_(k, k)] + np.diag(prior))
     out = {}
     for name, units in CONTROLLER.items():
@@ -307,14 +308,12 @@ def _controller(bench: Bench, fit: Fit) -> dict[str, dict]:
     return out
 
 
-def _null_point(bench: Bench) -> tuple[dict[str, float], Reduced]:
-    """The recalibrated nominal model: the nuisances alone, on the same recordings; and the log evidence there."""
+def _null(bench: Bench) -> Bench:
+    """The recalibrated nominal model: the nuisances alone, on the same recordings."""
     null = Bench(bench.machine, bench.recordings, bench.processes)
-    null.weights = bench.weights
-    for _ in range(2):
-        normal = null.normal(null.linearise())
-        null.move(Model((), 0.0, 0.0, {}, {}), normal)
-    return null.values(), null.reduce(null.normal(null.linearise()))
+    null.weights, null.workers = bench.weights, bench.workers
+    null.settle(Model((), 0.0, 0.0, {}, {}))
+    return null
 
 
 def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
@@ -373,8 +372,8 @@ def _shrinks(
     told = reading.named or reading.forms or reading.groups
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
-    point, null = _null_point(explored)
-    recalibrated = {**off, **point}
+    null = _null(explored)
+    recalibrated = {**off, **null.values()}
     after = {**recalibrated, **_values(explored, fit, model)} if told else recalibrated
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
@@ -383,16 +382,17 @@ def _shrinks(
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
-    signal = {
+    at_null = null.reduce(null.normal(null.linearise()))
+    signal: dict[str, float | None] = {
         "nominal": rms(ladder.blocks(nominal)), "recalibrated": rms(base),
-        "placebo": placebo(null, base, equations, len(mine)), "after": rms(best), "floor": 1.0,
+        "placebo": placebo(at_null, base, equations, len(mine)), "after": rms(best), "floor": 1.0,
     }  # fmt: skip
-    signal["closed"] = closed(signal["recalibrated"], signal["after"], 1.0, count)
+    signal["closed"] = closed(rms(base), rms(best), 1.0, count)
     for entry in found:
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
             alone = {**recalibrated, **{p.name: after[p.name] for p in form.parameters}}
-            entry["closed"] = closed(signal["recalibrated"], rms(ladder.blocks(alone)), 1.0, count)
+            entry["closed"] = closed(rms(base), rms(ladder.blocks(alone)), 1.0, count)
     return {"signal": signal, "features": None, "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings)}
 
 

@@ -85,8 +85,8 @@ def usable(state: State, j: int) -> np.ndarray:
 def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
     """Means over runs of intervals between commutations, where no end currents are recorded: (sample,) -> (run,).
 
-    The flux's change over a run is that between its ends, so that the ripple in between drops out, which neighbouring means
-    do not tell and which goes with the ripple of the regressors.
+    The flux's change over a run is that between its ends, so that the ripple in between drops out, which neighbouring
+    means do not tell and which goes with the ripple of the regressors.
     """
     starts, lengths, rows = _runs(state, j)
     return lambda x: np.add.reduceat(np.asarray(x, float)[rows], starts) / lengths

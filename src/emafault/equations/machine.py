@@ -1,6 +1,7 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
-TIMING = 0.5  # of an interval and of a control period, by which means and samples within it may be told apart
+TIMING = 0.3  # of an interval and of a control period, by which means and samples within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
@@ -37,7 +38,7 @@ class ReferenceActuator:
         self.actuator = actuator
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
-        self._along: dict[tuple[str, str], dict[str, np.ndarray]] = {}
+        self._along: dict[tuple[str, str], dict[str, Any]] = {}
         self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
         self.parameters = self._nuisances()
@@ -66,7 +67,7 @@ class ReferenceActuator:
                     )
         for name in ("position_gain", "speed_gain", "speed_integral_gain"):
             at = getattr(a, name)
-            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
+            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "", vanishes=0.0)
         for name in ("current_limit", "speed_limit"):
             at = getattr(a, name)
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
@@ -242,14 +243,14 @@ class ReferenceActuator:
                     state.p = kept
         return out
 
-    def _coordinates(self, state: State, equation: str) -> dict[str, np.ndarray]:
-        """What the rows of an equation lie along, and a remainder's drivers; at the first point, as these hardly move."""
+    def _coordinates(self, state: State, equation: str) -> dict[str, Any]:
+        """What the rows of an equation lie along, and a remainder's drivers, at the first point: they hardly move."""
         key = state.rec.name, equation
         if key not in self._along:
             self._along[key] = self._new_coordinates(state, equation)
         return self._along[key]
 
-    def _new_coordinates(self, state: State, equation: str) -> dict[str, np.ndarray]:
+    def _new_coordinates(self, state: State, equation: str) -> dict[str, Any]:
         """What the rows of an equation lie along, and the drivers that a coefficient would multiply; (row,) each."""
         rec = state.rec
         w = rec.speed / 100.0
@@ -282,9 +283,7 @@ class ReferenceActuator:
             drivers += [state.bus_current]
         elif equation == "position":
             drivers += [rec.direction, rec.acceleration / 1e3]
-        def of(x: np.ndarray) -> np.ndarray:
-            return x
-
+        of: Callable[[np.ndarray], np.ndarray] = np.asarray
         if equation == "control":
             width = control.block_length(rec)
             blocks = (np.arange(rec.size // width - 1) + 1) * width

@@ -2,8 +2,8 @@
 
 Each recording is simulated under the leading set at its fit. Its normal matrix is added to that of the bench, without a
 residual of its own, as the leading set would leave none on average: the log odds of two sets change by what the
-Gaussian evidence of both matrices together says more than that of the bench alone (expected log Bayes factor; Lindley 1956, Annals of
-Mathematical Statistics 27, 986, is the general case).
+Gaussian evidence of both matrices together says more than that of the bench alone (expected log Bayes factor; Lindley
+1956, Annals of Mathematical Statistics 27, 986, is the general case).
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,7 +62,7 @@ def next_recordings(
     actuator: ActuatorParameters = bench.machine.actuator
     before = {names: _log_odds(bench, fit.normal, first, rival, {}) for names, rival in rivals}
     named = _name(first, bench)
-    found = []
+    found: list[dict[str, Any]] = []
     for n, (command, settings, duration, ambients) in enumerate(MENU):
         for ambient in ambients:
             recording = _imagined(actuator, noise, values, effects, (command, settings, duration, ambient), n)
@@ -78,7 +78,7 @@ def next_recordings(
                         "expected_odds": float(np.exp(np.clip(gain, 0.0, np.log(LARGEST_ODDS)))),
                     }
                 )  # fmt: skip
-    best: dict[str, dict] = {}
+    best: dict[str, dict[str, Any]] = {}
     for entry in sorted(found, key=lambda e: -e["expected_odds"]):
         best.setdefault(entry["separates"][1], entry)
     return sorted(best.values(), key=lambda e: -e["expected_odds"])[:PROPOSED]
@@ -132,7 +132,7 @@ def _with_next(fit: Fit, new: Normal) -> Normal:
 
 
 def _log_odds(bench: Bench, normal: Normal, first: Model, rival: Model, widths: Mapping[str, float]) -> float:
-    """Difference of the log evidences of two sets under a normal matrix, the new recording's own parameters integrated."""
+    """Difference of the log evidences of two sets under a normal matrix, what is the new recording's own integrated."""
     own = np.array([k for k, n in enumerate(normal.names) if n in widths], int)
     rest = np.array([k for k, n in enumerate(normal.names) if n not in widths], int)
     H = normal.H[np.ix_(rest, rest)]

@@ -74,6 +74,7 @@ def _entry(
     sentence = "In the measuring chain " + text.format(words, value, units, 100.0 * value) + "."
     return {
         "unit": f"~{form}", "equation": equation, "along": "time", "form": form, "probability": CERTAIN, "closed": None,
-        "another_form_of": None, "parameters": {parameter: {"value": value, "low": value, "high": value, "units": units}},
+        "another_form_of": None,
+        "parameters": {parameter: {"value": value, "low": value, "high": value, "units": units}},
         "recordings": list(names), "sentence": sentence,
     }  # fmt: skip

@@ -54,9 +54,7 @@ def diagnose_folder(
     bench = read_bench(path, actuator)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
     split = split_bench(bench.recordings)
-    found = diagnose(
-        bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES
-    )
+    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
     verdict = found.verdict
     verdict["warnings"] = bench.warnings
     print("\n".join(finding(verdict)), flush=True)
@@ -147,7 +145,7 @@ def _page(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str)
         page.figure(
             "how_far",
             figures.draw_ladder(verdict["shrinks"]),
-            "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: the unit's tolerances fitted. "
+            "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: tolerances fitted. "
             "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
         )
     page.heading("Controller")
