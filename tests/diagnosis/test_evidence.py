@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from emafault.diagnosis.evidence import Normal, log_evidence, marginalise
-from emafault.diagnosis.whitening import autoregression, whiten
+from emafault.diagnosis.whitening import autoregression, filtered, whiten
 
 
 @pytest.fixture
@@ -76,5 +76,6 @@ def test_autoregression_finds_what_made_a_series():
     assert np.allclose(coefficients[:2], [0.6, -0.3], atol=0.03)
     assert variance == pytest.approx(1.0, abs=0.04)
     bands = [np.ones(len(x))]
-    white = whiten(bands, np.ones(len(x), bool), x[:, None].copy(), coefficients, variance)[:, 0]
+    keep = np.ones(len(x), bool)
+    white = filtered(whiten(bands, keep, x[:, None].copy()), keep, coefficients, variance)[:, 0]
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02

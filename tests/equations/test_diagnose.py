@@ -86,7 +86,8 @@ def test_names_and_order_of_files_change_nothing(cogging):
     renamed = {f"x{9 - n}.nc": r for n, r in enumerate(recordings.values())}
     names = list(renamed)
     explore, confirm = names[:3], names[3:]
-    verdict = diagnose("bench", dict(reversed(list(renamed.items()))), (explore[::-1], confirm), ACTUATOR, NOISE)
+    found = diagnose("bench", dict(reversed(list(renamed.items()))), (explore[::-1], confirm), ACTUATOR, NOISE)
+    verdict = found.verdict
     assert verdict["which"][0]["effects"] == ["cogging"]
     assert verdict["inclusion"] == pytest.approx(cogging["inclusion"], abs=1e-3)
 

@@ -443,14 +443,14 @@ class Bench:
         self.point, self.on = kept
         return step
 
-    def settle(self, model: Model, normal: Normal | None = None) -> Model:
+    def settle(self, model: Model, normal: Normal | None = None, still: float = STILL, steps: int = SETTLING) -> Model:
         """A set at its own optimum, by Gauss-Newton from the present point, which moves there.
 
         ``normal`` of a model fitted there saves the first step.
         """
         if normal is not None:
             on = set(self.on)
-            if self.move(model, normal) < STILL:
+            if self.move(model, normal) < still:
                 return model
             if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
                 # a secant points the way only: its effect finds its place before anything undescribed takes it
@@ -458,7 +458,7 @@ class Bench:
                 return self.settle(Model(kept, 0.0, 0.0, {}, {}))
         members = {c.unit: c for c in model.choices}
         found = model
-        for _ in range(SETTLING):
+        for _ in range(steps):
             shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
             choices = tuple(
                 replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c
@@ -473,7 +473,7 @@ class Bench:
                 for c in choices
             }
             found = search.fit(tuple(width), {m: w for m, w in width.items() if w in candidates[m].widths})
-            if self.move(found, at_point) < STILL:
+            if self.move(found, at_point) < still:
                 break
         return found
 

@@ -26,10 +26,12 @@ from .signals import Signals, estimated_noise
 from .terms import TERMS
 
 SCHEMA = "2.0"
+POLISHED, POLISHING = 0.01, 8  # prior standard deviations that the last step moves, and most steps
 Z = 1.645  # standard deviations of a 90 % interval
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 FORM = {"~lag": "lag", "~crosstalk": "crosstalk", "~drift": "drift"}
+SAMPLED = 0.01  # of a gain: the controller samples what the recordings have means of
 TOLD = 3.0  # standard deviations from nominal at which a controller's gain is told as different
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
 
@@ -138,11 +140,11 @@ def _diagnosed(
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
     verdict["discovered"] = [*told(recordings), *_discovered(bench, reading, best)]
-    verdict["controller"] = _controller(bench, fit, reading)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
     after_values = _values(bench, fit, best)
+    verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
     verdict["shrinks"] = _shrinks(bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"])
@@ -290,7 +292,7 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
     return out
 
 
-def _controller(bench: Bench, fit: Fit, reading: Reading) -> dict[str, dict]:
+def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, float]) -> dict[str, dict]:
     """The controller's gains as fitted in the control equation."""
     index = fit.normal.index
     n = [x for x in bench.nuisances if x.startswith("controller.")]
@@ -302,8 +304,8 @@ def _controller(bench: Bench, fit: Fit, reading: Reading) -> dict[str, dict]:
     out = {}
     for name, units in CONTROLLER.items():
         full = f"controller.{name}"
-        sd = float(np.sqrt(covariance[n.index(full), n.index(full)]))
-        value, nominal = bench.point[full], bench.parameters[full].off
+        value, nominal = values[full], bench.parameters[full].off
+        sd = float(np.hypot(np.sqrt(covariance[n.index(full), n.index(full)]), SAMPLED * abs(value)))
         out[name] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": units, "nominal": nominal}
     return out
 
@@ -319,7 +321,7 @@ def _null(bench: Bench) -> Bench:
 def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     """All values at a model's fit, the nuisances with it."""
     kept = dict(bench.point), set(bench.on)
-    bench.move(model, fit.normal)
+    bench.settle(model, fit.normal, POLISHED, POLISHING)
     out = bench.values()
     bench.point, bench.on = kept
     return out

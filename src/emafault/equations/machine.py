@@ -67,7 +67,7 @@ class ReferenceActuator:
                     )
         for name in ("position_gain", "speed_gain", "speed_integral_gain"):
             at = getattr(a, name)
-            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "", vanishes=0.0)
+            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
         for name in ("current_limit", "speed_limit"):
             at = getattr(a, name)
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
@@ -212,7 +212,16 @@ class ReferenceActuator:
             for parameter, column in self._secants(state, name, r, values).items():
                 columns[parameter] = column
             blocks.append(
-                Block(rec.name, name, np.asarray(r.value), columns, bands, usable, self._coordinates(state, name))
+                Block(
+                    rec.name,
+                    name,
+                    np.asarray(r.value),
+                    columns,
+                    bands,
+                    usable,
+                    self._coordinates(state, name),
+                    differenced=name == "control",
+                )  # fmt: skip
             )
         return blocks
 
