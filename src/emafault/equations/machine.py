@@ -221,7 +221,7 @@ class ReferenceActuator:
                     usable,
                     self._coordinates(state, name),
                     differenced=name == "control",
-                )  # fmt: skip
+                )
             )
         return blocks
 
