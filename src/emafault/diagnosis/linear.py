@@ -186,5 +186,5 @@ def weights_from(block: Block, names: Sequence[str], rows: np.ndarray, deviation
     keep = usable & ~(out | np.roll(out, 1))
     if keep.sum() < 0.5 * usable.sum():
         keep = usable
-    coefficients, variance = autoregression(np.where(keep, left, 0.0), keep, block.differenced)
+    coefficients, variance = autoregression(np.where(keep, left, 0.0), keep)
     return Weights(keep, coefficients, max(variance, 1e-6))

@@ -57,7 +57,7 @@ class Block:
 
     ``residual`` (row,), ``columns`` parameter -> scalar or (row,), ``bands`` diagonals of the noise's covariance
     (main first), ``usable`` (row,) bool, ``coordinates`` name -> (row,), with ``phi`` (function, row) and ``drivers``
-    (driver, row) for remainders; ``differenced`` where rows are differences of successive means.
+    (driver, row) for remainders.
     """
 
     recording: str
@@ -67,4 +67,3 @@ class Block:
     bands: list[np.ndarray]
     usable: np.ndarray
     coordinates: dict = field(default_factory=dict)
-    differenced: bool = False

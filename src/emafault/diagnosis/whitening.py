@@ -82,24 +82,21 @@ def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, varia
 
 
 def _without_dips(r: np.ndarray) -> np.ndarray:
-    """Autocovariances (lag,) of a spectrum whose lower half is nowhere below the median.
+    """Autocovariances (lag,) of a spectrum that is nowhere below its median.
 
-    A model that fits, or a difference that is none, digs a hole into the spectrum of what is left at low frequencies;
-    taken for noise that is quieter there, it would make a bias look significant.
+    A model that fits, or a difference that is none, digs a hole into the spectrum of what is left; taken for noise
+    that is quieter there, it would make a bias look significant.
     """
     k = np.arange(len(r))
     w = (np.arange(GRID) + 0.5) * np.pi / GRID
     cosine = np.cos(np.outer(w, k[1:]))
     spectrum = r[0] + 2.0 * cosine @ (r[1:] * (1.0 - k[1:] / len(r)))
-    spectrum = np.maximum(spectrum, np.where(w < 0.5 * np.pi, np.median(spectrum), 1e-3 * r[0]))
+    spectrum = np.maximum(spectrum, np.median(spectrum))
     return np.concatenate([[spectrum.mean()], spectrum @ cosine / GRID])
 
 
-def autoregression(x: np.ndarray, usable: np.ndarray, differenced: bool = False) -> tuple[np.ndarray, float]:
-    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance.
-
-    ``differenced`` rows are quieter at low frequencies by what they are; of others that is not believed.
-    """
+def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
+    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
     top = min(ORDER, n // 20)
@@ -107,8 +104,7 @@ def autoregression(x: np.ndarray, usable: np.ndarray, differenced: bool = False)
     r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(lags + 1)])
     if r[0] <= 0.0:
         return np.zeros(0), 1.0
-    if not differenced:
-        r = _without_dips(r)
+    r = _without_dips(r)
     best, chosen, variance = n * np.log(r[0]), np.zeros(0), r[0]
     a, error = np.zeros(0), r[0]
     for order in range(1, top + 1):  # Levinson-Durbin

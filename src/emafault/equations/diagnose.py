@@ -31,7 +31,7 @@ Z = 1.645  # standard deviations of a 90 % interval
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 FORM = {"~lag": "lag", "~crosstalk": "crosstalk", "~drift": "drift"}
-SAMPLED = 0.01  # of a gain: the controller samples what the recordings have means of
+SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
 TOLD = 3.0  # standard deviations from nominal at which a controller's gain is told as different
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
 

@@ -18,7 +18,7 @@ FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
-TIMING = 0.3  # of an interval and of a control period, by which means and samples within it may be told apart
+TIMING = 0.5  # of an interval and of a control period, by which means and samples within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
@@ -220,7 +220,6 @@ class ReferenceActuator:
                     bands,
                     usable,
                     self._coordinates(state, name),
-                    differenced=name == "control",
                 )
             )
         return blocks
