@@ -4,14 +4,21 @@ import numpy as np
 import pytest
 
 from emafault.errors import InputError
+from emafault.recording import Recording
 from emafault.withheld.disturbances import DISTURBANCES, disturbed, draw_controller
-
-from ..equations.conftest import recorded
 
 
 @pytest.fixture(scope="module")
 def recording():
-    return recorded("sine", None, (0.0,) * 6, seed=1)
+    rng = np.random.default_rng(1)
+    size = 500
+    return Recording(
+        time=(np.arange(size) + 1) * 2e-4, phase_voltage=rng.normal(0.0, 5.0, (size, 3)),
+        phase_current=rng.normal(0.0, 2.0, (size, 3)), phase_current_end=rng.normal(0.0, 2.0, (size, 3)),
+        rotor_speed=rng.normal(size=size), rotor_angle=rng.normal(size=size), output_position=rng.normal(size=size),
+        commanded_position=rng.normal(size=size), bus_voltage=rng.normal(size=size), ambient_temperature=20.0,
+        attributes={},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", DISTURBANCES)
