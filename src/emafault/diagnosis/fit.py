@@ -215,8 +215,9 @@ class Bench:
             if unit.id not in self.sizes or (model is not None and unit.id not in model.units):
                 continue
             sizes = self.sizes[unit.id]
-            if unit.on is not None and unit.id in self.on:
-                sizes = {p.name: -self.prior(p.name)[2] for p in unit.on.parameters}
+            if unit.id in self.on:  # of what the point holds: an effect of no size has no form
+                here = self.active(unit)[0].parameters if unit.on is not None else unit.parameters
+                sizes = self.sizes[unit.id] = {p.name: -self.prior(p.name)[2] for p in here}
             out[unit.id] = {self.parameters[n].alias or n: d for n, d in sizes.items()}
         return out
 

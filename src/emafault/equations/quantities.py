@@ -15,7 +15,10 @@ def fill(state: State) -> None:
     """Compute them, in the order in which they depend on one another."""
     rec, p = state.rec, state.p
     state.dT = p.own("dT") + rec.dT_measured
-    rec.dT = state.dT  # the terms of the effects see the recording
+    # the terms of the effects see the recording
+    rec.dT = state.dT
+    scale = _product(state, "inertia")
+    rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
     state.current, state.current_end = true_currents(rec, p)
     _angles(state)
     _coefficients(state)

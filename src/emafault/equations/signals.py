@@ -11,6 +11,7 @@ from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..recording import Recording
+from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
 SLOW = 2.0  # rad/s, below which dry friction has no known sign
@@ -73,7 +74,9 @@ class Signals:
         self.current_step = max(lattice_step(x) for x in self.current.T)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
-        self.dT: Any = self.dT_measured  # with its derivative once a point is known
+        # with their derivatives once a point is known
+        self.dT: Any = self.dT_measured
+        self.inertia_scale: Any = Dual(1.0)
 
     def _start_angle(self) -> float:
         moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)

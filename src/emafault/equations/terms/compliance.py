@@ -12,16 +12,19 @@ SHARE = 0.3  # of the inertia behind the stiffness
 STIFFEST = 2e-5  # rad/(N m)
 
 
-def solve(rec, flexibility, damping, play):
-    """User angle (rad) and torque on the motor less that of a rigid shaft (N m) along the measured rotor angle."""
+def solve(rec, flexibility, damping, play, scale):
+    """User angle (rad) and torque on the motor less that of a rigid shaft (N m) along the measured rotor angle.
+
+    ``scale`` of this unit's inertia, which the user shaft has its share of.
+    """
     a = rec.actuator
     if flexibility < STIFFEST:
         return None
-    J = SHARE * a.inertia * a.gear_ratio**2
+    J = SHARE * scale * a.inertia * a.gear_ratio**2
     position, torque = flexible_shaft(
         rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
     )
-    return position, torque / a.gear_ratio - SHARE * a.inertia * rec.acceleration
+    return position, torque / a.gear_ratio - SHARE * scale * a.inertia * rec.acceleration
 
 
 def twist(p, rec, rigid, play):
@@ -35,16 +38,16 @@ def torque(p, rec):
 
 
 def _dual(p, rec, which, rigid, play):
-    flexibility, damping = p("flexibility"), p("C")
-    base = solve(rec, flexibility.value, damping.value, play)
+    flexibility, damping, scale = p("flexibility"), p("C"), rec.inertia_scale
+    base = solve(rec, flexibility.value, damping.value, play, scale.value)
     if base is None:
         return rigid if rigid is not None else flexibility.through(0.0, 0.0)
     slopes = []
-    for f, c, step in ((1e-6, 0.0, 1e-6), (0.0, 5.0, 5.0)):
-        there = solve(rec, flexibility.value + f, damping.value + c, play)
+    for f, c, s, step in ((1e-6, 0.0, 0.0, 1e-6), (0.0, 5.0, 0.0, 5.0), (0.0, 0.0, 0.01, 0.01)):
+        there = solve(rec, flexibility.value + f, damping.value + c, play, scale.value + s)
         slopes.append((there[which] - base[which]) / step)
     value = np.asarray(base[which])
-    return flexibility.through(value, slopes[0]) + damping.through(0.0, slopes[1])
+    return flexibility.through(value, slopes[0]) + damping.through(0.0, slopes[1]) + scale.through(0.0, slopes[2])
 
 
 def report(value, deviation):
