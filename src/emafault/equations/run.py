@@ -95,7 +95,10 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
         )
     out += [d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"]
+    left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
     for name, g in verdict["controller"].items():
+        if left and name != "position_gain":
+            continue  # what nothing describes may be a gain's doing, or take its place
         apart = abs(g["value"] - g["nominal"])
         sd = (g["high"] - g["low"]) / 3.29
         if apart > TOLD * sd and apart > TELLING * g["nominal"]:
