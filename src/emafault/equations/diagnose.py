@@ -225,6 +225,7 @@ def _which(
             {
                 "effects": list(effects), "probability": p, "group": "group 1" if inside and reading.groups else None,
                 "parameters": _parameters(bench, machine, effects, search.wide(model)),
+                "log_evidence_gain": float(model.log_likelihood - search.fit(()).log_likelihood),
             }
         )  # fmt: skip
     rest = sum(p for _, p, _ in reading.sets[12:])

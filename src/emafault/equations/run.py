@@ -199,7 +199,8 @@ def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
             label = f"none of the library ({entry['equation'].replace('_', ' ')})"
         out.append(
             {
-                "label": label or "no gap", "probability": entry["probability"], "kind": kind, "gain": None,
+                "label": label or "no gap", "probability": entry["probability"], "kind": kind,
+                "gain": entry.get("log_evidence_gain"),
                 "group": entry.get("group"),
             }
         )  # fmt: skip
