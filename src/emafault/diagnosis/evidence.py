@@ -6,6 +6,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr
 
+from ..actuator.compiled import compiled
+
 
 @dataclass
 class Normal:
@@ -67,30 +69,84 @@ def log_evidence(
     -------
     log evidence, posterior mean (free,) and standard deviation (free,) of the deviations
     """
-    base = r.fixed.copy()
-    base[free] = mean
-    on = np.flatnonzero(base)
-    Mb = r.M[:, on] @ base[on] if len(on) else np.zeros(len(base))
-    constant = r.constant - 0.5 * base[on] @ Mb[on] + r.b[on] @ base[on]
-    if not len(free):
-        return constant, np.zeros(0), np.zeros(0)
-    gradient = (r.b[free] - Mb[free]) * sd
-    A = r.M[np.ix_(free, free)] * np.outer(sd, sd)
-    A[np.diag_indices_from(A)] += 1.0
-    try:
-        L = np.linalg.cholesky(A)
-    except np.linalg.LinAlgError:  # what is left of columns of mere noise may have no definite sign
-        return -np.inf, np.asarray(mean, float), np.asarray(sd, float)
-    inverse = np.linalg.inv(L)
-    z = inverse @ gradient
-    value = constant + 0.5 * z @ z - np.log(np.diag(L)).sum()
-    step = inverse.T @ z
-    deviation = np.sqrt((inverse**2).sum(axis=0)) * sd
-    found = mean + sd * step
+    mean, sd = np.asarray(mean, float), np.asarray(sd, float)
+    value, found, deviation = _evidence(r.M, r.b, r.constant, r.fixed, free, mean, sd)
+    if not np.isfinite(value):  # what is left of columns of mere noise may have no definite sign
+        return -np.inf, mean, sd
     if signs is not None:
         one = signs != 0
         if np.any(one):
             # a prior on one side of off is twice as dense there: the posterior's mass on that side counts
-            where = found[one] - r.fixed[free][one]
+            where = found[one] - r.fixed[free[one]]
             value += float(np.sum(np.log(2.0) + log_ndtr(signs[one] * where / deviation[one])))
     return float(value), found, deviation
+
+
+@compiled
+def factored(A):
+    """Lower Cholesky factor, in place; whether there is one."""
+    n = A.shape[0]
+    for k in range(n):
+        d = A[k, k]
+        for q in range(k):
+            d -= A[k, q] * A[k, q]
+        if not d > 0.0:
+            return False
+        d = np.sqrt(d)
+        A[k, k] = d
+        for m in range(k + 1, n):
+            x = A[m, k]
+            for q in range(k):
+                x -= A[m, q] * A[k, q]
+            A[m, k] = x / d
+    return True
+
+
+@compiled
+def _evidence(M, b, constant, fixed, free, mean, sd):
+    """Log evidence, posterior mean and standard deviation: ``log_evidence`` without sides."""
+    n = len(free)
+    found, deviation = mean.copy(), sd.copy()
+    base = fixed.copy()
+    for k in range(n):
+        base[free[k]] = mean[k]
+    on = np.flatnonzero(base)
+    for p in on:
+        x = 0.0
+        for q in on:
+            x += M[p, q] * base[q]
+        constant += (b[p] - 0.5 * x) * base[p]
+    A, z = np.empty((n, n)), np.empty(n)
+    for k in range(n):
+        row = free[k]
+        x = b[row]
+        for q in on:
+            x -= M[row, q] * base[q]
+        z[k] = x * sd[k]
+        for m in range(k + 1):
+            A[k, m] = M[row, free[m]] * sd[k] * sd[m]
+        A[k, k] += 1.0
+    if not factored(A):
+        return -np.inf, found, deviation
+    for k in range(n):  # z = L^-1 of the gradient
+        x = z[k]
+        for q in range(k):
+            x -= A[k, q] * z[q]
+        z[k] = x / A[k, k]
+        constant += 0.5 * z[k] * z[k] - np.log(A[k, k])
+    inverse = np.zeros((n, n))
+    for k in range(n):
+        inverse[k, k] = 1.0 / A[k, k]
+        for m in range(k):
+            x = 0.0
+            for q in range(m, k):
+                x -= A[k, q] * inverse[q, m]
+            inverse[k, m] = x / A[k, k]
+    for m in range(n):
+        step, power = 0.0, 0.0
+        for k in range(m, n):
+            step += inverse[k, m] * z[k]
+            power += inverse[k, m] * inverse[k, m]
+        found[m] = mean[m] + sd[m] * step
+        deviation[m] = np.sqrt(power) * sd[m]
+    return constant, found, deviation

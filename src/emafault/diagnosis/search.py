@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from .evidence import Reduced, log_evidence
+from ..actuator.compiled import compiled
+from .evidence import Reduced, factored, log_evidence
 from .model import Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
@@ -80,6 +81,11 @@ class Search:
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
         self.counts = listed, every.count("form"), every.count("remainder")
+        flat = list(candidates.values())
+        self.flat = (
+            np.cumsum([0, *(len(c.index) for c in flat)]), _joined([c.index for c in flat]).astype(int),
+            _joined([c.mean for c in flat]), _joined([c.sd for c in flat]),
+        )  # fmt: skip
 
     # ---- one set
     def fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None = None) -> Model:
@@ -218,22 +224,50 @@ class Search:
         d = r.fixed.copy()
         for n, value in model.deviations.items():
             d[r.index[n]] = value
-        on = np.flatnonzero(d)
-        left = r.b - (r.M[:, on] @ d[on] if len(on) else 0.0)
-        scores = []
-        for m, c in self.candidates.items():
-            if m[0] in inside:
-                continue
-            step = c.mean - d[c.index]
-            A = r.M[np.ix_(c.index, c.index)] * np.outer(c.sd, c.sd) + np.eye(len(c.index))
-            g = (left[c.index] - r.M[np.ix_(c.index, c.index)] @ step) * c.sd
-            gain = (
-                left[c.index] @ step
-                - 0.5 * step @ r.M[np.ix_(c.index, c.index)] @ step
-                + 0.5 * g @ np.linalg.solve(A, g)
-            )
-            scores.append((float(gain), m))
-        return [m for _, m in sorted(scores, key=lambda x: -x[0])[:most]]
+        gains = _gains(r.M, r.b, d, *self.flat)
+        ranked = [(-gains[k], k) for k, m in enumerate(self.candidates) if m[0] not in inside]
+        every = list(self.candidates)
+        return [every[k] for _, k in sorted(ranked)[:most]]
+
+
+@compiled
+def _gains(M, b, d, starts, index, mean, sd):
+    """Log evidence (candidate,) that each candidate's own columns would add to deviations ``d``, all else held."""
+    left = b.copy()
+    for q in np.flatnonzero(d):
+        for k in range(len(left)):
+            left[k] -= M[k, q] * d[q]
+    out = np.empty(len(starts) - 1)
+    for c in range(len(out)):
+        own = index[starts[c] : starts[c + 1]]
+        n = len(own)
+        A, step, g = np.empty((n, n)), np.empty(n), np.empty(n)
+        for k in range(n):
+            step[k] = mean[starts[c] + k] - d[own[k]]
+        gain = 0.0
+        for k in range(n):
+            moved = 0.0
+            for m in range(n):
+                moved += M[own[k], own[m]] * step[m]
+                A[k, m] = M[own[k], own[m]] * sd[starts[c] + k] * sd[starts[c] + m]
+            A[k, k] += 1.0
+            g[k] = (left[own[k]] - moved) * sd[starts[c] + k]
+            gain += (left[own[k]] - 0.5 * moved) * step[k]
+        if not factored(A):
+            out[c] = -np.inf
+            continue
+        for k in range(n):
+            x = g[k]
+            for q in range(k):
+                x -= A[k, q] * g[q]
+            g[k] = x / A[k, k]
+            gain += 0.5 * g[k] * g[k]
+        out[c] = gain
+    return out
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([np.zeros(0), *parts])
 
 
 @cache
