@@ -113,15 +113,15 @@ def _evidence(M, b, constant, fixed, free, mean, sd):
     on = np.flatnonzero(base)
     for p in on:
         x = 0.0
-        for q in on:
-            x += M[p, q] * base[q]
+        for o in on:
+            x += M[p, o] * base[o]
         constant += (b[p] - 0.5 * x) * base[p]
     A, z = np.empty((n, n)), np.empty(n)
     for k in range(n):
         row = free[k]
         x = b[row]
-        for q in on:
-            x -= M[row, q] * base[q]
+        for o in on:
+            x -= M[row, o] * base[o]
         z[k] = x * sd[k]
         for m in range(k + 1):
             A[k, m] = M[row, free[m]] * sd[k] * sd[m]

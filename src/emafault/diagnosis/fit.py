@@ -8,27 +8,16 @@ from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal, Reduced, marginalise
 from .forked import Workers
-from .linear import (
-    OWN_FORM,
-    Weights,
-    White,
-    assemble,
-    compressed,
-    correct,
-    full_model,
-    key_of,
-    weights_from,
-    white_rows,
-)
+from .linear import OWN_FORM, Weights, White, assemble, full_model, white_rows
+from .linearisation import Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
 ROUNDS = 3
-FIRST = 2  # steps of the unit alone before the search
+FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 CARRYING = 5  # units that carry their own form
-SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 STILL = 0.3  # prior standard deviations by which the point may still move
 
 
@@ -48,48 +37,6 @@ class Fit:
     reduced: Reduced
     normal: Normal
     search: Search
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What is to be linearised: where, by which columns, with which equations' remainders (None: all)."""
-
-    values: dict[str, float]
-    wanted: list[str]
-    only: bool
-    remainders: set[str] | None
-    full: Mapping[str, float] | None
-    corrected: bool
-    own: Mapping[str, Mapping[str, float]]
-
-
-def _compress(
-    machine, task: _Task, recording: str, weights: dict[tuple[str, str], Weights]
-) -> tuple[list[White], dict[tuple[str, str], Weights]]:
-    """Normal matrices of a recording's blocks, and their weights where a full model renews them."""
-    only = set(task.wanted) if task.only else None
-    blocks = machine.blocks(task.values, recording, wanted=only)
-    again: Sequence = [None] * len(blocks)
-    if task.corrected:
-        again = machine.blocks(task.values, recording, disturbed=True, wanted=only)
-    parts = [
-        white_rows(
-            b, task.wanted, task.remainders is None or b.equation in task.remainders,
-            task.own if b.equation not in SETTINGS else None,
-        )
-        for b in blocks
-    ]  # fmt: skip
-    renewed: dict[tuple[str, str], Weights] = {}
-    if task.full is not None:
-        renewed = {key_of(b): weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
-    weights = weights | renewed
-    out = []
-    for block, other, part in zip(blocks, again, parts, strict=True):
-        white = compressed(block, *part, weights.get(key_of(block)))
-        if other is not None:
-            correct(white, block, other, weights.get(key_of(block)))
-        out.append(white)
-    return out, renewed
 
 
 class Bench:
@@ -120,7 +67,6 @@ class Bench:
         for n, p in self.parameters.items():
             if p.alias is not None:
                 self._beyond.setdefault(p.alias, []).append(n)
-        self.corrected = True
         self.workers: Workers | None = None
         self.remainders: dict[str, Unit] = {}
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
@@ -157,20 +103,25 @@ class Bench:
 
         ``renew`` takes the weights from what a full model leaves there.
         """
+        columns, aliases = self._columns_of(model)
+        wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
+        left = None
+        if model is not None:
+            left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
+        task = Task(self.values(), wanted, left, self._amounts(model))
+        if not renew:
+            return self._each(task)
+        whites = self._each(replace(task, corrected=False, again=True))
+        full = full_model(whites, self._full_prior(columns, aliases))
+        return self._each(replace(task, full=full))
+
+    def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
+        """Columns of units, all or those of a model, and aliases."""
         columns, aliases = self.columns()
         if model is not None:
             inside = {n for c in model.choices for n in self.names_of(c)}
             columns = [n for n in columns if n in inside]
-        wanted = list(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
-        own = None if model is None else {u.split(":", 1)[1] for u in model.units if u.startswith("remainder:")}
-        task = _Task(
-            self.values(), wanted, model is not None, own, None, self.corrected and not renew, self._amounts(model)
-        )
-        whites = self._each(task)
-        if renew:
-            full = full_model(whites, self._full_prior(columns, aliases))
-            whites = self._each(replace(task, full=full, corrected=self.corrected))
-        return whites
+        return columns, aliases
 
     def _full_prior(self, columns: Sequence[str], aliases: Mapping[str, str]) -> dict[str, tuple[float, float]]:
         """Mean and standard deviation of deviations with everything free, an alias's width added to its quantity's."""
@@ -183,15 +134,15 @@ class Bench:
             out[own] = (before[0], float(np.hypot(before[1], sd)))
         return out
 
-    def _each(self, task: "_Task") -> list[White]:
+    def _each(self, task: Task) -> list[White]:
         """A task done for every recording, side by side where there are processes; takes renewed weights over."""
         if self.workers is None:
             several = min(self.processes, len(self.recordings))
             for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
-            self.workers = Workers(self, self.machine, several)
+            self.workers = Workers(self, Linearisation(self.machine), several)
         mine = [{k: w for k, w in self.weights.items() if k[0] == n} for n in self.recordings]
-        found = self.workers.map(_compress, list(zip([task] * len(mine), self.recordings, mine, strict=True)))
+        found = self.workers.map("compress", list(zip([task] * len(mine), self.recordings, mine, strict=True)))
         for _, renewed in found:
             self.weights |= renewed
         return [w for whites, _ in found for w in whites]
@@ -240,10 +191,7 @@ class Bench:
 
     def normal(self, whites: Sequence[White], model: Model | None = None) -> Normal:
         """Normal matrix of all columns, or of those that a model has, remainders among them."""
-        columns, aliases = self.columns()
-        if model is not None:
-            inside = {n for c in model.choices for n in self.names_of(c)}
-            columns = [n for n in columns if n in inside]
+        columns, aliases = self._columns_of(model)
         left = list(dict.fromkeys(n for w in whites for n in w.names if not is_parameter(n)))
         return assemble(whites, [*self.nuisances, *columns, *left], aliases)
 
@@ -392,8 +340,8 @@ class Bench:
         """Search and relinearise until the leading set stands still; ``begun``: another bench of the unit, fitted."""
         if begun is None:
             # the unit first: its nuisances move the point before anything is compared
-            for renewed in (False, *[True] * (FIRST - 1)):
-                self.move(Model((), 0.0, 0.0, {}, {}), self.normal(self.linearise(renew=renewed)))
+            self.settle(Model((), 0.0, 0.0, {}, {}), steps=1)
+            self.move(Model((), 0.0, 0.0, {}, {}), self.normal(self.linearise(renew=True)))
             whites = self.linearise(renew=True)
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, self.normal(whites), FIRST, False)
@@ -467,13 +415,13 @@ class Bench:
             )
             this = replace(model, choices=choices)
             at_point = self.normal(self.linearise(this), this)
-            units, candidates = self.candidates(self.reduce(at_point))
-            search = Search(self.reduce(at_point), units, candidates)
+            reduced = self.reduce(at_point)
+            search = Search(reduced, *self.candidates(reduced))
             width = {
-                (c.unit, c.variant if (c.unit, c.variant) in candidates else c.variant % OTHER_FORM): c.width
+                (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
                 for c in choices
             }
-            found = search.fit(tuple(width), {m: w for m, w in width.items() if w in candidates[m].widths})
+            found = search.fit(tuple(width), {m: w for m, w in width.items() if w in search.candidates[m].widths})
             if self.move(found, at_point) < still:
                 break
         return found

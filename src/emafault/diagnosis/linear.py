@@ -79,7 +79,7 @@ def white_rows(
     names without that of the residual, and (row, column) divided by the noise's covariance."""
     names = [n for n in wanted if n in block.columns]
     count = len(block.residual)
-    columns = [np.broadcast_to(block.columns[n], count) for n in names]
+    columns = [block.columns[n] for n in names]
     if remainder:
         size = float(np.sqrt(np.median(block.bands[0])))
         more, extra = remainder_columns(block, size)
@@ -87,11 +87,15 @@ def white_rows(
     for unit, amounts in (own or {}).items():
         more, extra = own_columns(block, unit, amounts)
         names, columns = names + more, columns + extra
-    raw = np.empty((count, len(names) + 1))
+    return names, whiten(block.bands, block.usable, columns_of([*columns, block.residual], count))
+
+
+def columns_of(columns: Sequence, count: int) -> np.ndarray:
+    """(row, column) in the order of memory that the filters go along."""
+    out = np.empty((len(columns), count))
     for k, c in enumerate(columns):
-        raw[:, k] = c
-    raw[:, -1] = block.residual
-    return names, whiten(block.bands, block.usable, raw)
+        out[k] = c
+    return np.ascontiguousarray(out.T)
 
 
 def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weights | None) -> White:
@@ -112,16 +116,17 @@ def correct(white: White, block: Block, disturbed: Block, weights: Weights | Non
     of these changes with one another are what noise adds on average (Fuller 1987, Measurement Error Models, section
     2.2).
     """
-    raw = np.zeros((len(block.residual), len(white.names) + 1))
-    for k, n in enumerate(white.names):
-        if n in block.columns:
-            raw[:, k] = disturbed.columns.get(n, 0.0) - block.columns[n]
-    raw[:, -1] = disturbed.residual - block.residual
-    changed = [k for k in range(raw.shape[1]) if np.any(raw[:, k])]
-    rows = _weighed(whiten(block.bands, block.usable, np.ascontiguousarray(raw[:, changed])), weights)
+    last = len(white.names)
+    changes = {
+        k: disturbed.columns.get(n, 0.0) - block.columns[n] for k, n in enumerate(white.names) if n in block.columns
+    }
+    changes[last] = disturbed.residual - block.residual
+    changed = [k for k, change in changes.items() if np.any(change)]
+    raw = columns_of([changes[k] for k in changed], len(block.residual))
+    rows = _weighed(whiten(block.bands, block.usable, raw), weights)
     noise = (rows**2).sum(axis=0)
     power = np.diag(white.gram)[changed]
-    most = np.where(np.array(changed) == raw.shape[1] - 1, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
+    most = np.where(np.array(changed) == last, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
     rows *= np.minimum(1.0, most)
     own = white.gram[-1, -1]  # the same for all hypotheses
     white.gram[np.ix_(changed, changed)] -= rows.T @ rows

@@ -234,9 +234,9 @@ class Search:
 def _gains(M, b, d, starts, index, mean, sd):
     """Log evidence (candidate,) that each candidate's own columns would add to deviations ``d``, all else held."""
     left = b.copy()
-    for q in np.flatnonzero(d):
+    for o in np.flatnonzero(d):
         for k in range(len(left)):
-            left[k] -= M[k, q] * d[q]
+            left[k] -= M[k, o] * d[o]
     out = np.empty(len(starts) - 1)
     for c in range(len(out)):
         own = index[starts[c] : starts[c + 1]]

@@ -63,10 +63,8 @@ def _mean_shape(state: State, low, high, shift, ramp) -> Dual:
     f1, f2 = trapezoid_at(low - off, r)[0], trapezoid_at(high - off, r)[0]
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
-        h = m.harmonics
-        swept_2 = h(state.p.of(effect_name(m)), high - off)[1]
-        swept_1 = h(state.p.of(effect_name(m)), low - off)[1]
-        total = total + (swept_2 - swept_1)
+        of = state.p.of(effect_name(m))
+        total = total + m.harmonics(of, high - off) - m.harmonics(of, low - off)
     return total
 
 

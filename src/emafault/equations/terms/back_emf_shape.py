@@ -12,7 +12,10 @@ def ramp(p):
 
 
 def harmonics(p, angle):
-    """Added to f(x), its integral over x, at an electrical angle (rad)."""
-    value = [p(h) * np.sin(n * angle) for h, n in ORDERS.items()]
-    swept = [p(h) * (-np.cos(n * angle) / n) for h, n in ORDERS.items()]
-    return value[0] + value[1], swept[0] + swept[1]
+    """Integral over the electrical angle (rad) of what is added to f."""
+    total = 0.0
+    for h, n in ORDERS.items():
+        size = p(h)
+        if size.value or size.slopes:
+            total = total + size * (-np.cos(n * angle) / n)
+    return total
