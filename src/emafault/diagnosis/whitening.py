@@ -13,22 +13,20 @@ GRID = 128  # frequencies at which it is looked at
 
 @compiled
 def _factor(bands, usable):
-    """Lower Cholesky factor (3, row) of a covariance with up to two off-diagonals, rows not used left out."""
-    n = bands.shape[1]
-    out = np.zeros((3, n))
+    """Lower Cholesky factor (band, row) of a banded covariance, rows not used left out; [m, k] is row k, column k-m."""
+    width, n = bands.shape
+    out = np.zeros((width, n))
     for k in range(n):
         d = bands[0, k] * (1.0 if usable[k] else LEFT_OUT)
-        l1, l2 = 0.0, 0.0
-        if k >= 2:
-            l2 = bands[2, k - 2] / out[0, k - 2]
-        if k >= 1:
-            below = bands[1, k - 1]
-            if k >= 2:
-                below -= l2 * out[1, k - 1]
-            l1 = below / out[0, k - 1]
-        rest = d - l1 * l1 - l2 * l2
+        rest = d
+        for m in range(min(width - 1, k), 0, -1):
+            x = bands[m, k - m]
+            for q in range(m + 1, min(width - 1, k) + 1):
+                x -= out[q, k] * out[q - m, k - m]
+            x /= out[0, k - m]
+            out[m, k] = x
+            rest -= x * x
         out[0, k] = np.sqrt(max(rest, 1e-12 * d))
-        out[1, k], out[2, k] = l1, l2
     return out
 
 
@@ -36,14 +34,21 @@ def _factor(bands, usable):
 def _substitute(lower, usable, rows):
     """Forward substitution, row by row in place; rows not used become zero."""
     n, m = rows.shape
-    one, two = np.zeros(m), np.zeros(m)
+    width = lower.shape[0]
+    before = np.zeros((width, m))
     for k in range(n):
-        a, b, c = 1.0 / lower[0, k], lower[1, k], lower[2, k]
+        own = k % width
+        a = 1.0 / lower[0, k]
         for q in range(m):
-            x = (rows[k, q] - b * one[q] - c * two[q]) * a
-            two[q] = one[q]
-            one[q] = x
-            rows[k, q] = x if usable[k] else 0.0
+            before[own, q] = rows[k, q]
+        for p in range(1, min(width - 1, k) + 1):
+            f, other = lower[p, k], (k - p) % width
+            if f != 0.0:
+                for q in range(m):
+                    before[own, q] -= f * before[other, q]
+        for q in range(m):
+            before[own, q] *= a
+            rows[k, q] = before[own, q] if usable[k] else 0.0
 
 
 @compiled
@@ -69,7 +74,7 @@ def _filter(rows, keep, coefficients, scale):
 def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """(row, column) divided in place by the Cholesky factor of the banded covariance; rows not usable become zero."""
     n = len(bands[0])
-    full = np.zeros((3, n))
+    full = np.zeros((len(bands), n))
     for k, band in enumerate(bands):
         full[k, : n - k] = band
     _substitute(_factor(full, usable), usable, rows)

@@ -9,15 +9,20 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..actuator.commands import with_corners
+from ..actuator.compiled import compiled
 from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
+from .torque import UNRESOLVED
+from .signals import SPEED_SPAN
 from .terms import with_hook
 
 BLOCK = 2e-3  # s
 AVERAGED = 1e-2  # s
 USUAL_DELAY = 1e-4  # s
+RIPPLE = 0.0075  # of the hysteresis band, that stays in a block's mean (measured on simulations without noise)
+HEADROOM = 0.1  # of the supply's voltage
 NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
@@ -35,11 +40,11 @@ def residual(state: State) -> Dual:
     seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
     wanted = p("controller.position_gain") * (a.gear_ratio * (_commanded(rec, lead) - _at_ticks(output, h, lead)))
     error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
-    state.at_limit = _at_limit(rec)
-    # the integral rests while the demand is at its limit
-    integral = error.kept(~state.at_limit).linear(lambda x: np.cumsum(x) * h, rec.size)
-    demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
-    demand = clip(demand, p("controller.current_limit"))
+    gain, integral_gain = p("controller.speed_gain"), p("controller.speed_integral_gain")
+    limit = p("controller.current_limit")
+    rests = _rests(np.asarray(error.value), h, *(float(value_of(x)) for x in (gain, integral_gain, limit)))
+    integral = error.kept(~rests).linear(lambda x: np.cumsum(x) * h, rec.size)
+    demand = clip(gain * error + integral_gain * integral, limit)
     late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
@@ -50,10 +55,30 @@ def residual(state: State) -> Dual:
     return (pair - demand).linear(lambda x: _blocks(x, width), rec.size)
 
 
+@compiled
+def _rests(error, h, gain, integral_gain, limit):
+    """(sample,) where the integral is not advanced, for the demand would exceed its limit."""
+    out = np.zeros(error.shape[0], np.bool_)
+    total = 0.0
+    for n in range(error.shape[0]):
+        if abs(gain * error[n] + integral_gain * (total + error[n] * h)) > limit:
+            out[n] = True
+        else:
+            total += error[n] * h
+    return out
+
+
 def _at_limit(rec) -> np.ndarray:
     """(sample,) where the current stands at its highest: the demand is limited there."""
     level = 0.5 * np.abs(rec.current).sum(axis=1)
     return level > NEAR_LIMIT * rec.actuator.current_limit
+
+
+def _without_headroom(rec) -> np.ndarray:
+    """(sample,) where back-EMF and resistance leave the supply too little to drive the current that is asked for."""
+    a = rec.actuator
+    needed = 2.0 * a.back_emf * np.abs(rec.speed) + a.resistance * np.abs(rec.current).sum(axis=1)
+    return needed > (1.0 - HEADROOM) * a.bus_voltage
 
 
 def block_length(rec) -> int:
@@ -81,9 +106,13 @@ def _centred(x: np.ndarray, h: float, lead: float) -> np.ndarray:
     return np.interp(n, np.arange(-1, len(x)), np.concatenate([[0.0], x]))
 
 
-def _blocks(x: np.ndarray, width: int) -> np.ndarray:
+def _means(x: np.ndarray, width: int) -> np.ndarray:
     count = len(x) // width
-    return np.diff(x[: count * width].reshape(count, width).mean(axis=1))
+    return x[: count * width].reshape(count, width).mean(axis=1)
+
+
+def _blocks(x: np.ndarray, width: int) -> np.ndarray:
+    return np.diff(_means(x, width))
 
 
 def late(state: State) -> np.ndarray:
@@ -101,7 +130,7 @@ def usable(state: State) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    free = ~_at_limit(rec)[: count * width].reshape(count, width).any(axis=1)
+    free = ~(_at_limit(rec) | _without_headroom(rec))[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean
     level = 0.5 * np.abs(rec.current).sum(axis=1)[: count * width].reshape(count, width)
     known = moving & free & (level.min(axis=1) > rec.actuator.hysteresis)
@@ -109,13 +138,33 @@ def usable(state: State) -> np.ndarray:
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
-    """Diagonals of the noise's covariance (A2)."""
+    """Diagonals of the noise's covariance (A2): of the current, and of what the controller saw, through its law."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
-    width = block_length(rec)
-    averaged = np.sqrt(max(1, round(AVERAGED / rec.interval)))
-    demand = a.speed_gain * np.hypot(s.speed, a.gear_ratio * a.position_gain * s.position) / averaged
-    ripple = 0.1 * a.hysteresis
-    white = (s.current**2 + ripple**2) / width + demand**2 + (0.005 * a.hysteresis) ** 2
-    walk = (a.speed_integral_gain / a.speed_gain * demand) ** 2 * rec.interval * width * rec.interval
+    h, width = rec.interval, block_length(rec)
     count = rec.size // width - 1
-    return [np.full(count, 2.0 * white + walk), np.full(count - 1, -white)]
+    level = _means(0.5 * np.abs(rec.current).sum(axis=1), width)
+    change = np.abs(np.diff(level, append=level[-1:])) / width
+    change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
+    white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2
+    bands: list[np.ndarray | float] = [white[1:] + white[:-1], -white[1:-1]]
+    averaged, calm = max(1, round(AVERAGED / h)), max(1, round(SPEED_SPAN / h))
+    size = 2 * (averaged + calm) + 8 * width
+    impulse = np.zeros(size)
+    impulse[(averaged + calm) // 2 + width] = 1.0
+    position = a.gear_ratio * a.position_gain
+    rate = uniform_filter1d(np.diff(impulse, prepend=0.0) / h, calm)
+    angle = a.position_gain * impulse + rate
+    slow = uniform_filter1d(impulse, averaged)
+    for source, sigma in (
+        (position * slow, s.position),
+        (slow, s.speed),
+        (angle - uniform_filter1d(angle, averaged), s.angle),
+    ):
+        demand = a.speed_gain * source + a.speed_integral_gain * h * np.cumsum(source)
+        blocked = uniform_filter1d(demand, width, mode="nearest")
+        seen = blocked[width:] - blocked[:-width]
+        for k in range(-(-(averaged + calm) // width) + 3):
+            if k == len(bands):
+                bands.append(0.0)
+            bands[k] = bands[k] + sigma**2 * float(seen[k * width :] @ seen[: len(seen) - k * width])
+    return [np.broadcast_to(band, max(count - k, 0)) for k, band in enumerate(bands)]

@@ -47,8 +47,7 @@ class State:
 
     Lists are by phase. ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
     ``conducting`` mean of f over the part in which the phase is switched on, ``rise`` voltage of the inductance (V),
-    ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m), ``at_limit`` whether the current
-    is limited.
+    ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m).
     """
 
     dT: Dual
@@ -64,7 +63,6 @@ class State:
     loss: np.ndarray
     bus_current: np.ndarray
     drive: np.ndarray
-    at_limit: np.ndarray
 
     def __init__(self, rec: Signals, point: Point):
         from . import quantities

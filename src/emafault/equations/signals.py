@@ -132,7 +132,13 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             if r.phase_current_end is not None and still.sum() > 20:
                 x = r.phase_current_end[:, j] - r.phase_current_end.mean(axis=1)
                 ends.append(x[still] - np.median(x[still]))
-    limits = {"angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(2.0 / 3.0)}
+    output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
+    speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
+    limits = {
+        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(2.0 / 3.0), "position": output,
+    }  # fmt: skip
+    if lattice_step(fine[0].rotor_speed) == 0.0:
+        limits["speed"] = speed
     return replace(
         nominal,
         **{
