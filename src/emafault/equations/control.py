@@ -14,9 +14,9 @@ from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
-from .torque import UNRESOLVED
 from .signals import SPEED_SPAN
 from .terms import with_hook
+from .torque import UNRESOLVED
 
 BLOCK = 2e-3  # s
 AVERAGED = 1e-2  # s
