@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .evidence import Reduced
-from .linear import Weights, White, assemble, compressed, key_of, white_rows
+from .linear import White, assemble, compressed, white_rows
+from .linearisation import Carried
 
-STEPS = 2  # of a refit of what belongs to a recording alone
+STEPS = 1  # of a refit of what belongs to a recording alone
 PLACEBOS = 20
 
 
@@ -19,21 +20,19 @@ def own(parameters: Sequence[str], recording: str) -> list[str]:
 class Ladder:
     """Confirm recordings under frozen models; each one's soak temperature and seeded fault are refitted."""
 
-    def __init__(
-        self, machine, recordings: Sequence[str], parameters: Mapping, weights: Mapping[tuple[str, str], Weights]
-    ):
-        self.machine, self.recordings, self.parameters, self.weights = machine, list(recordings), parameters, weights
+    def __init__(self, machine, recordings: Sequence[str], parameters: Mapping, carried: Mapping[str, Carried]):
+        self.machine, self.recordings, self.parameters, self.carried = machine, list(recordings), parameters, carried
 
     def blocks(self, values: Mapping[str, float], remainders: bool = False) -> list[White]:
         """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked."""
         out: list[White] = []
         for recording in self.recordings:
             free = [n for n in own(list(self.parameters), recording) if n in values]
-            mine = dict(values)
+            mine, weights = dict(values), self.carried[recording].weights
             for step in range(STEPS + 1):
                 last = step == STEPS
                 whites = [
-                    compressed(b, *white_rows(b, free, remainders and last), self.weights.get(key_of(b)))
+                    compressed(b, *white_rows(b, free, remainders and last), weights.get(b.equation))
                     for b in self.machine.blocks(mine, recording, wanted=free)
                 ]
                 if last:

@@ -8,8 +8,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from .evidence import Normal, Reduced, marginalise
 from .forked import Workers
-from .linear import OWN_FORM, Weights, White, assemble, full_model, white_rows
-from .linearisation import Linearisation, Task
+from .linear import OWN_FORM, White, assemble, full_model, white_rows
+from .linearisation import Carried, Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
@@ -19,6 +19,10 @@ LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 CARRYING = 5  # units that carry their own form
 STILL = 0.3  # prior standard deviations by which the point may still move
+SETTLED = 0.5  # log evidence that one more step of a set may still promise
+
+
+NOTHING = Model((), 0.0, 0.0, {}, {})  # the unit alone
 
 
 def is_parameter(column: str) -> bool:
@@ -32,7 +36,7 @@ class Fit:
 
     values: dict[str, float]  # the point of linearisation
     whites: list[White]
-    weights: dict[tuple[str, str], Weights]
+    carried: dict[str, Carried]  # by recording
     models: list[Model]
     reduced: Reduced
     normal: Normal
@@ -55,7 +59,7 @@ class Bench:
         self.units: list[Unit] = list(machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()}
         self.on: set[str] = set()
-        self.weights: dict[tuple[str, str], Weights] = {}
+        self.carried: dict[str, Carried] = {}
         of_unit = {p.name for u in self.units for p in u.parameters}
         mine = set(self.recordings)
         self.nuisances = [
@@ -98,10 +102,10 @@ class Bench:
                 out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
         return out
 
-    def linearise(self, model: Model | None = None, renew: bool = False) -> list[White]:
+    def linearise(self, model: Model | None = None, renew: bool = False, known: Sequence[White] = ()) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
-        ``renew`` takes the weights from what a full model leaves there.
+        ``renew`` takes the weights from what a full model leaves there; blocks ``known`` at this point are taken over.
         """
         columns, aliases = self._columns_of(model)
         wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
@@ -109,11 +113,12 @@ class Bench:
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
         task = Task(self.values(), wanted, left, self._amounts(model))
+        names = [n for n in self.recordings if n not in {w.recording for w in known}]
         if not renew:
-            return self._each(task)
-        whites = self._each(replace(task, corrected=False, again=True))
+            return [*known, *self._each(task, names)]
+        whites = [*known, *self._each(replace(task, again=True), names)]
         full = full_model(whites, self._full_prior(columns, aliases))
-        return self._each(replace(task, full=full))
+        return [*known, *self._each(replace(task, full=full), names)]
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""
@@ -134,17 +139,15 @@ class Bench:
             out[own] = (before[0], float(np.hypot(before[1], sd)))
         return out
 
-    def _each(self, task: Task) -> list[White]:
-        """A task done for every recording, side by side where there are processes; takes renewed weights over."""
+    def _each(self, task: Task, names: Sequence[str]) -> list[White]:
+        """A task done for recordings, side by side where there are processes; takes over what they carry."""
         if self.workers is None:
             several = min(self.processes, len(self.recordings))
             for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
             self.workers = Workers(self, Linearisation(self.machine), several)
-        mine = [{k: w for k, w in self.weights.items() if k[0] == n} for n in self.recordings]
-        found = self.workers.map("compress", list(zip([task] * len(mine), self.recordings, mine, strict=True)))
-        for _, renewed in found:
-            self.weights |= renewed
+        found = self.workers.map("compress", [(task, n, self.carried.get(n, Carried())) for n in names])
+        self.carried |= {n: carried for n, (_, carried) in zip(names, found, strict=True)}
         return [w for whites, _ in found for w in whites]
 
     def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
@@ -293,8 +296,14 @@ class Bench:
         return [*self.units, *self.remainders.values()], out
 
     # ---- the whole
-    def move(self, model: Model, normal: Normal) -> float:
-        """Move the point to a model's fit; returns the largest step in prior standard deviations."""
+    def move(self, model: Model, normal: Normal) -> tuple[float, float]:
+        """Move the point to a model's fit.
+
+        Returns
+        -------
+        largest step in prior standard deviations, and the log evidence that the step promises (Newton decrement;
+        Boyd and Vandenberghe 2004, Convex Optimization, section 9.5.1)
+        """
         given = {n: d for n, d in model.deviations.items()}
         nuisance = self.nuisance_deviations(normal, given)
         largest = max((abs(d) / self.prior(n)[1] for n, d in nuisance.items()), default=0.0)
@@ -316,6 +325,7 @@ class Bench:
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
             on.add(unit.id)
+        decrement = np.inf if switched else self._decrement(moved, normal)
         found = self.after(moved)
         for unit in self.units:
             if unit.id not in inside:
@@ -324,7 +334,14 @@ class Bench:
         for unit, p, d in switched:
             self._switch_on(unit, p, d)
         self.on = on
-        return largest
+        return largest, decrement
+
+    def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
+        names = [n for n in moved if n in normal.index]
+        k = np.array([normal.index[n] for n in names], int)
+        d = np.array([moved[n] for n in names])
+        sd = np.array([self.prior(n)[1] for n in names])
+        return float(0.5 * (d @ normal.H[np.ix_(k, k)] @ d + np.sum((d / sd) ** 2)))
 
     def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:
         """An effect found along a secant gets parameters of its own."""
@@ -336,27 +353,41 @@ class Bench:
             self.point[own.name] = own.off + (at - own.off) * amount if first else at
             first = False
 
-    def fit(self, begun: "Bench | None" = None) -> Fit:
-        """Search and relinearise until the leading set stands still; ``begun``: another bench of the unit, fitted."""
+    def fit(self, begun: "tuple[Bench, Fit] | None" = None) -> Fit:
+        """Search and relinearise until the leading set stands still.
+
+        ``begun``: a bench of some of these recordings and its fit, to go on from.
+        """
         if begun is None:
             # the unit first: its nuisances move the point before anything is compared
-            self.settle(Model((), 0.0, 0.0, {}, {}), steps=1)
-            self.move(Model((), 0.0, 0.0, {}, {}), self.normal(self.linearise(renew=True)))
-            whites = self.linearise(renew=True)
+            self.settle(NOTHING)
+            whites, normal = self._renewed()
+            if self._step(NOTHING, normal) > STILL:
+                self.settle(NOTHING, normal)
+                whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
-            whites, normal, search = self._until_still(whites, self.normal(whites), FIRST, False)
+            whites, normal, search = self._until_still(whites, normal, FIRST, False)
             self._carry_own_forms(search)
+            if self.sizes:
+                whites, normal = self._renewed()
         else:
-            self.point |= {n: v for n, v in begun.point.items() if n in self.point}
-            self.on, self.sizes, self.closer = set(begun.on), dict(begun.sizes), dict(begun.closer)
-        whites = self.linearise(renew=True)
-        whites, normal, search = self._until_still(whites, self.normal(whites), ROUNDS)
+            bench, fit = begun
+            self.point |= {n: v for n, v in fit.values.items() if n in self.point}
+            self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
+            self.carried |= fit.carried
+            whites = self.linearise(renew=True, known=fit.whites)
+            normal = self.normal(whites)
+        whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
-            if not self._leave_out(search):
+            if not self._leave_out(search, normal):
                 break
-            whites = self.linearise()
-            whites, normal, search = self._until_still(whites, self.normal(whites), ROUNDS)
-        return Fit(dict(self.point), whites, self.weights, search.ranked(), search.reduced, normal, search)
+            whites, normal = self._renewed()
+            whites, normal, search = self._until_still(whites, normal, ROUNDS)
+        return Fit(dict(self.point), whites, self.carried, search.ranked(), search.reduced, normal, search)
+
+    def _renewed(self) -> tuple[list[White], Normal]:
+        whites = self.linearise(renew=True)
+        return whites, self.normal(whites)
 
     def _until_still(
         self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
@@ -367,7 +398,8 @@ class Bench:
             if self._step(best, normal) < STILL:
                 break
             self.settle(best, normal)
-            whites = self.linearise(renew=True)
+            # weights are those of the first look: a hypothesis gains nothing by what it leaves
+            whites = self.linearise(renew=not remainders)
             normal = self.normal(whites)
             search = self._search(normal, remainders)
         return whites, normal, search
@@ -388,18 +420,18 @@ class Bench:
     def _step(self, model: Model, normal: Normal) -> float:
         """Largest step that a model would move the point by, which stays."""
         kept = dict(self.point), set(self.on)
-        step = self.move(model, normal)
+        step = self.move(model, normal)[0]
         self.point, self.on = kept
         return step
 
-    def settle(self, model: Model, normal: Normal | None = None, still: float = STILL, steps: int = SETTLING) -> Model:
+    def settle(self, model: Model, normal: Normal | None = None, steps: int = SETTLING) -> Model:
         """A set at its own optimum, by Gauss-Newton from the present point, which moves there.
 
         ``normal`` of a model fitted there saves the first step.
         """
         if normal is not None:
             on = set(self.on)
-            if self.move(model, normal) < still:
+            if self.move(model, normal)[1] < SETTLED:
                 return model
             if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
                 # a secant points the way only: its effect finds its place before anything undescribed takes it
@@ -422,26 +454,27 @@ class Bench:
                 for c in choices
             }
             found = search.fit(tuple(width), {m: w for m, w in width.items() if w in search.candidates[m].widths})
-            if self.move(found, at_point) < still:
+            if self.move(found, at_point)[1] < SETTLED:
                 break
         return found
 
-    def _leave_out(self, search: Search) -> bool:
+    def _leave_out(self, search: Search, normal: Normal) -> bool:
         """Compare the leading set with those that lack one member, each at its own optimum; whether one is better.
 
         What the linear model says of them from a point far from theirs is replaced by what it says at their own.
         """
         best = search.ranked()[0]
+        members = [u for u in best.units if not u.startswith("remainder:")]
+        if not members:
+            return False
         begun = dict(self.point), set(self.on)
         leading = self.settle(best)
         top = leading.log_posterior
         better = (dict(self.point), set(self.on)), False
-        for unit in best.units:
-            if unit.startswith("remainder:"):
-                continue
+        for unit in members:
             self.point, self.on = dict(begun[0]), set(begun[1])
             less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
-            self._switch_off(unit)
+            self.move(less, normal)  # where the linear model has the set's optimum
             own = self.settle(Model(less.choices, 0.0, 0.0, {}, {}))
             error = best.log_posterior - less.log_posterior - (leading.log_posterior - own.log_posterior)
             if self._by_secant(unit):
@@ -449,13 +482,8 @@ class Bench:
             less.log_posterior += error
             if own.log_posterior > top:
                 top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
-        self.point, self.on = better[0]
+        self.point, self.on = better[0] if better[1] else begun
         return better[1]
 
     def _by_secant(self, unit: str) -> bool:
         return any(p.secant is not None for u in self.units if u.id == unit for p in u.parameters)
-
-    def _switch_off(self, unit: str) -> None:
-        for p in next(u for u in self.units if u.id == unit).parameters:
-            self.point[p.name] = p.off
-        self.on.discard(unit)

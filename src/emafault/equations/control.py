@@ -9,7 +9,6 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..actuator.commands import with_corners
-from ..actuator.compiled import compiled
 from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
@@ -40,11 +39,9 @@ def residual(state: State) -> Dual:
     seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
     wanted = p("controller.position_gain") * (a.gear_ratio * (_commanded(rec, lead) - _at_ticks(output, h, lead)))
     error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
-    gain, integral_gain = p("controller.speed_gain"), p("controller.speed_integral_gain")
-    limit = p("controller.current_limit")
-    rests = _rests(np.asarray(error.value), h, *(float(value_of(x)) for x in (gain, integral_gain, limit)))
-    integral = error.kept(~rests).linear(lambda x: np.cumsum(x) * h, rec.size)
-    demand = clip(gain * error + integral_gain * integral, limit)
+    # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them
+    integral = error.linear(lambda x: np.cumsum(x) * h, rec.size)
+    demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
     late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
@@ -53,19 +50,6 @@ def residual(state: State) -> Dual:
     pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
     width = block_length(rec)
     return (pair - demand).linear(lambda x: _blocks(x, width), rec.size)
-
-
-@compiled
-def _rests(error, h, gain, integral_gain, limit):
-    """(sample,) where the integral is not advanced, for the demand would exceed its limit."""
-    out = np.zeros(error.shape[0], np.bool_)
-    total = 0.0
-    for n in range(error.shape[0]):
-        if abs(gain * error[n] + integral_gain * (total + error[n] * h)) > limit:
-            out[n] = True
-        else:
-            total += error[n] * h
-    return out
 
 
 def _at_limit(rec) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, placebo, rms, rows
-from ..diagnosis.fit import Bench, Fit, is_parameter
+from ..diagnosis.fit import NOTHING, Bench, Fit, is_parameter
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
@@ -26,7 +26,6 @@ from .signals import Signals, estimated_noise
 from .terms import TERMS
 
 SCHEMA = "2.0"
-POLISHED, POLISHING = 0.01, 8  # prior standard deviations that the last step moves, and most steps
 Z = 1.645  # standard deviations of a 90 % interval
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
@@ -100,12 +99,11 @@ def diagnose(
     if not confirm:
         return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own)
     # from here on the confirm recordings are open
-    own = estimated_noise(list(recordings.values()), noise)
     whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
     every = Bench(whole, list(recordings), processes)
-    all_fit = every.fit(bench)
+    all_fit = every.fit((bench, fit))
     final = read(all_fit.models, all_fit.search.units.values(), tuple(whole.observed()))
-    ladder = Ladder(whole, confirm, every.parameters, all_fit.weights)
+    ladder = Ladder(whole, confirm, every.parameters, all_fit.carried)
     return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings, own)
 
 
@@ -314,15 +312,16 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
 def _null(bench: Bench) -> Bench:
     """The recalibrated nominal model: the nuisances alone, on the same recordings."""
     null = Bench(bench.machine, bench.recordings, bench.processes)
-    null.weights, null.workers = bench.weights, bench.workers
-    null.settle(Model((), 0.0, 0.0, {}, {}))
+    null.carried, null.workers = bench.carried, bench.workers
+    null.point |= {n: bench.point[n] for n in bench.nuisances}
+    null.settle(NOTHING)
     return null
 
 
 def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     """All values at a model's fit, the nuisances with it."""
     kept = dict(bench.point), set(bench.on)
-    bench.settle(model, fit.normal, POLISHED, POLISHING)
+    bench.settle(model, fit.normal)
     out = bench.values()
     bench.point, bench.on = kept
     return out

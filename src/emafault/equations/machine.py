@@ -65,10 +65,7 @@ class ReferenceActuator:
                     out[full] = Parameter(
                         full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
                     )
-        for name in ("position_gain", "speed_gain", "speed_integral_gain"):
-            at = getattr(a, name)
-            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
-        for name in ("current_limit", "speed_limit"):
+        for name in ("position_gain", "speed_gain", "speed_integral_gain", "speed_limit"):
             at = getattr(a, name)
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
         full = "controller.commutation_time"

@@ -2,26 +2,37 @@
 
 import numpy as np
 
+from ..actuator.compiled import compiled
 from ..actuator.motor import TWO_PI
 
 
-def trapezoid_swept(x: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray]:
+@compiled
+def trapezoid_swept(x, ramp):
     """Integral of the trapezoid f from 0 to x (electrical rad), and its derivative by ``ramp`` = (pi - width)/2."""
-    u = np.abs(x - TWO_PI * np.round(x / TWO_PI))
-    rest = np.pi - u
-    rising, falling = u < ramp, rest < ramp
-    value = np.where(
-        rising, u * u / (2.0 * ramp), np.where(falling, np.pi - ramp - rest * rest / (2.0 * ramp), u - 0.5 * ramp)
-    )
-    slope = np.where(rising, -(u * u) / (2.0 * ramp**2), np.where(falling, -1.0 + rest * rest / (2.0 * ramp**2), -0.5))
+    value, slope = np.empty(x.shape[0]), np.empty(x.shape[0])
+    for n in range(x.shape[0]):
+        u = abs(x[n] - TWO_PI * np.round(x[n] / TWO_PI))
+        rest = np.pi - u
+        if u < ramp:
+            value[n], slope[n] = u * u / (2.0 * ramp), -(u * u) / (2.0 * ramp * ramp)
+        elif rest < ramp:
+            value[n] = np.pi - ramp - rest * rest / (2.0 * ramp)
+            slope[n] = -1.0 + rest * rest / (2.0 * ramp * ramp)
+        else:
+            value[n], slope[n] = u - 0.5 * ramp, -0.5
     return value, slope
 
 
-def trapezoid_at(x: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray]:
-    """The trapezoid f(x), x electrical rad, and its derivative by ``ramp``."""
-    u = x - TWO_PI * np.round(x / TWO_PI)
-    size = np.abs(u)
-    edge = np.minimum(size, np.pi - size)
-    on_ramp = edge < ramp
-    sign = np.sign(u)
-    return sign * np.where(on_ramp, edge / ramp, 1.0), sign * np.where(on_ramp, -edge / ramp**2, 0.0)
+@compiled
+def trapezoid_at(x, ramp):
+    """The trapezoid f(x), x (sample,) electrical rad, and its derivative by ``ramp``."""
+    value, slope = np.empty(x.shape[0]), np.empty(x.shape[0])
+    for n in range(x.shape[0]):
+        u = x[n] - TWO_PI * np.round(x[n] / TWO_PI)
+        size, sign = abs(u), np.sign(u)
+        edge = min(size, np.pi - size)
+        if edge < ramp:
+            value[n], slope[n] = sign * edge / ramp, -sign * edge / (ramp * ramp)
+        else:
+            value[n], slope[n] = sign, 0.0
+    return value, slope

@@ -74,6 +74,7 @@ class Signals:
         self.current_step = max(lattice_step(x) for x in self.current.T)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
+        self.solved: dict[tuple, Any] = {}
         # with their derivatives once a point is known
         self.dT: Any = self.dT_measured
         self.inertia_scale: Any = Dual(1.0)

@@ -10,6 +10,7 @@ SHAPES = ({"flexibility": 6e-5, "C": 300.0}, {"flexibility": 1.3e-4, "C": 300.0}
 GROUND = 2.0  # N m s/rad from the user shaft to ground
 SHARE = 0.3  # of the inertia behind the stiffness
 STIFFEST = 2e-5  # rad/(N m)
+KEPT = 12  # solutions of a recording
 
 
 def solve(rec, flexibility, damping, play, scale):
@@ -39,15 +40,25 @@ def torque(p, rec):
 
 def _dual(p, rec, which, rigid, play):
     flexibility, damping, scale = p("flexibility"), p("C"), rec.inertia_scale
-    base = solve(rec, flexibility.value, damping.value, play, scale.value)
+    given = flexibility.value, damping.value, play, scale.value
+    base = _solved(rec, *given)
     if base is None:
         return rigid if rigid is not None else flexibility.through(0.0, 0.0)
-    slopes = []
-    for f, c, s, step in ((1e-6, 0.0, 0.0, 1e-6), (0.0, 5.0, 0.0, 5.0), (0.0, 0.0, 0.01, 0.01)):
-        there = solve(rec, flexibility.value + f, damping.value + c, play, scale.value + s)
-        slopes.append((there[which] - base[which]) / step)
-    value = np.asarray(base[which])
-    return flexibility.through(value, slopes[0]) + damping.through(0.0, slopes[1]) + scale.through(0.0, slopes[2])
+    out = flexibility.through(np.asarray(base[which]), 0.0)
+    for parameter, m, step in ((flexibility, 0, 1e-6), (damping, 1, 5.0), (scale, 3, 0.01)):
+        if parameter.slopes:
+            there = _solved(rec, *(x + step if k == m else x for k, x in enumerate(given)))
+            out = out + parameter.through(0.0, (there[which] - base[which]) / step)
+    return out
+
+
+def _solved(rec, *given):
+    """``solve``, kept with the recording for the equations that ask for it again."""
+    if given not in rec.solved:
+        if len(rec.solved) >= KEPT:
+            rec.solved.clear()
+        rec.solved[given] = solve(rec, *given)
+    return rec.solved[given]
 
 
 def report(value, deviation):
