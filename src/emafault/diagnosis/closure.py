@@ -28,7 +28,7 @@ class Ladder:
         out: list[White] = []
         for recording in self.recordings:
             free = [n for n in own(list(self.parameters), recording) if n in values]
-            mine, weights = dict(values), self.carried[recording].weights
+            mine, weights = dict(values), self.carried[recording]
             for step in range(STEPS + 1):
                 last = step == STEPS
                 whites = [

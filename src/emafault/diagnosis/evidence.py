@@ -3,10 +3,36 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.special import log_ndtr
 
 from ..actuator.compiled import compiled
+
+RIDGES = (0.0, 1e-12, 1e-10, 1e-8)  # of a unit diagonal, the first that makes a matrix definite
+
+
+class Definite:
+    """Cholesky factor of a matrix that is positive definite but for rounding, on the scale of a unit diagonal."""
+
+    def __init__(self, A: np.ndarray):
+        self.scale = 1.0 / np.sqrt(np.diag(A))
+        unit = A * np.outer(self.scale, self.scale)
+        for ridge in RIDGES:
+            try:
+                self.factor = cho_factor(unit + ridge * np.eye(len(A)), lower=True, check_finite=False)
+                return
+            except LinAlgError:
+                continue
+        raise LinAlgError("a normal matrix is far from positive definite")
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """A^-1 b, b (row,) or (row, column)."""
+        scale = self.scale if b.ndim == 1 else self.scale[:, None]
+        return scale * cho_solve(self.factor, scale * b, check_finite=False)
+
+    def half_log_determinant(self) -> float:
+        """Half the logarithm of A's determinant."""
+        return float(np.sum(np.log(np.diag(self.factor[0])) - np.log(self.scale)))
 
 
 @dataclass
@@ -49,14 +75,14 @@ def marginalise(normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.n
     x = np.setdiff1d(np.arange(len(normal.names)), n)
     H, g = normal.H, normal.g
     A = H[np.ix_(n, n)] * np.outer(sd, sd) + np.eye(len(n))
-    factor = cho_factor(A, lower=True, check_finite=False)
+    factor = Definite(A)
     gn = (g[n] + H[np.ix_(n, n)] @ mean) * sd
     Hnx = H[np.ix_(n, x)] * sd[:, None]
-    solved = cho_solve(factor, np.column_stack([Hnx, gn]), check_finite=False)
+    solved = factor.solve(np.column_stack([Hnx, gn]))
     M = H[np.ix_(x, x)] - Hnx.T @ solved[:, :-1]
     b = -(g[x] + H[np.ix_(x, n)] @ mean - Hnx.T @ solved[:, -1])
     constant = -0.5 * normal.c - g[n] @ mean - 0.5 * mean @ H[np.ix_(n, n)] @ mean
-    constant += 0.5 * gn @ solved[:, -1] - np.log(np.diag(factor[0])).sum()
+    constant += 0.5 * gn @ solved[:, -1] - factor.half_log_determinant()
     return Reduced([normal.names[k] for k in x], 0.5 * (M + M.T), b, float(constant), fixed[x])
 
 

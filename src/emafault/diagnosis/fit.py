@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
-from .evidence import Normal, Reduced, marginalise
+from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
 from .linear import OWN_FORM, White, assemble, full_model, white_rows
 from .linearisation import Carried, Linearisation, Task
@@ -19,6 +18,7 @@ LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 CARRYING = 5  # units that carry their own form
 STILL = 0.3  # prior standard deviations by which the point may still move
+REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
 
 
@@ -59,6 +59,7 @@ class Bench:
         self.units: list[Unit] = list(machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()}
         self.on: set[str] = set()
+        self.reach = REACH[1]
         self.carried: dict[str, Carried] = {}
         of_unit = {p.name for u in self.units for p in u.parameters}
         mine = set(self.recordings)
@@ -102,21 +103,24 @@ class Bench:
                 out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
         return out
 
-    def linearise(self, model: Model | None = None, renew: bool = False, known: Sequence[White] = ()) -> list[White]:
+    def linearise(
+        self, model: Model | None = None, renew: bool = False, known: Sequence[White] = (), corrected: bool = True
+    ) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
         ``renew`` takes the weights from what a full model leaves there; blocks ``known`` at this point are taken over.
+        ``corrected`` takes out what the noise in the regressors adds.
         """
         columns, aliases = self._columns_of(model)
         wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
         left = None
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        task = Task(self.values(), wanted, left, self._amounts(model))
+        task = Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
         names = [n for n in self.recordings if n not in {w.recording for w in known}]
         if not renew:
             return [*known, *self._each(task, names)]
-        whites = [*known, *self._each(replace(task, again=True), names)]
+        whites = [*known, *self._each(replace(task, again=True, corrected=False), names)]
         full = full_model(whites, self._full_prior(columns, aliases))
         return [*known, *self._each(replace(task, full=full), names)]
 
@@ -146,7 +150,7 @@ class Bench:
             for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
             self.workers = Workers(self, Linearisation(self.machine), several)
-        found = self.workers.map("compress", [(task, n, self.carried.get(n, Carried())) for n in names])
+        found = self.workers.map("compress", [(task, n, self.carried.get(n, {})) for n in names])
         self.carried |= {n: carried for n, (_, carried) in zip(names, found, strict=True)}
         return [w for whites, _ in found for w in whites]
 
@@ -261,7 +265,7 @@ class Bench:
         sd = np.array([self.prior(x)[1] for x in self.nuisances])
         A = normal.H[np.ix_(n, n)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
-        found = cho_solve(cho_factor(A), right)
+        found = Definite(A).solve(right)
         return dict(zip(self.nuisances, found.tolist(), strict=True))
 
     # ---- candidates
@@ -325,6 +329,7 @@ class Bench:
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
             on.add(unit.id)
+        moved = {n: self._within_reach(n, d) for n, d in moved.items()}
         decrement = np.inf if switched else self._decrement(moved, normal)
         found = self.after(moved)
         for unit in self.units:
@@ -335,6 +340,11 @@ class Bench:
             self._switch_on(unit, p, d)
         self.on = on
         return largest, decrement
+
+    def _within_reach(self, name: str, deviation: float) -> float:
+        """A deviation no further than the prior has any mass: a model that lacks the cause asks for more."""
+        mean, sd, _ = self.prior(name)
+        return float(np.clip(deviation, mean - self.reach * sd, mean + self.reach * sd))
 
     def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
         names = [n for n in moved if n in normal.index]
@@ -359,12 +369,12 @@ class Bench:
         ``begun``: a bench of some of these recordings and its fit, to go on from.
         """
         if begun is None:
-            # the unit first: its nuisances move the point before anything is compared
+            # the unit first: its nuisances move the point before anything is compared, but not to where only a cause
+            # that is missing would have them
+            self.reach = REACH[0]
             self.settle(NOTHING)
             whites, normal = self._renewed()
-            if self._step(NOTHING, normal) > STILL:
-                self.settle(NOTHING, normal)
-                whites, normal = self._renewed()
+            self.reach = REACH[1]
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, normal, FIRST, False)
             self._carry_own_forms(search)
@@ -393,13 +403,15 @@ class Bench:
         self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
     ) -> tuple[list[White], Normal, Search]:
         search = self._search(normal, remainders)
+        renewed: tuple[str, ...] = ()
         for _ in range(rounds):
             best = search.ranked()[0]
             if self._step(best, normal) < STILL:
                 break
             self.settle(best, normal)
-            # weights are those of the first look: a hypothesis gains nothing by what it leaves
-            whites = self.linearise(renew=not remainders)
+            # weights are those of the first look at a set: no hypothesis gains by what it leaves
+            whites = self.linearise(renew=best.units != renewed)
+            renewed = best.units
             normal = self.normal(whites)
             search = self._search(normal, remainders)
         return whites, normal, search
@@ -437,26 +449,31 @@ class Bench:
                 # a secant points the way only: its effect finds its place before anything undescribed takes it
                 kept = tuple(c for c in model.choices if self._kind(c.unit) not in ("form", "remainder"))
                 return self.settle(Model(kept, 0.0, 0.0, {}, {}))
-        members = {c.unit: c for c in model.choices}
-        found = model
         for _ in range(steps):
-            shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
-            choices = tuple(
-                replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c
-                for c in members.values()
-            )
-            this = replace(model, choices=choices)
-            at_point = self.normal(self.linearise(this), this)
-            reduced = self.reduce(at_point)
-            search = Search(reduced, *self.candidates(reduced))
-            width = {
-                (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
-                for c in choices
-            }
-            found = search.fit(tuple(width), {m: w for m, w in width.items() if w in search.candidates[m].widths})
+            # on its way a set may be led by a little bias, where it ends it must not
+            found, at_point = self._fitted(model, corrected=False)
             if self.move(found, at_point)[1] < SETTLED:
                 break
+        found, at_point = self._fitted(model)
+        self.move(found, at_point)
         return found
+
+    def _fitted(self, model: Model, corrected: bool = True) -> tuple[Model, Normal]:
+        """A set fitted by the linear model of the present point, and that model; its members' widths stay."""
+        shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
+        choices = tuple(
+            replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c for c in model.choices
+        )
+        this = replace(model, choices=choices)
+        at_point = self.normal(self.linearise(this, corrected=corrected), this)
+        reduced = self.reduce(at_point)
+        search = Search(reduced, *self.candidates(reduced))
+        width = {
+            (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
+            for c in choices
+        }
+        fixed = {m: w for m, w in width.items() if w in search.candidates[m].widths}
+        return search.fit(tuple(width), fixed), at_point
 
     def _leave_out(self, search: Search, normal: Normal) -> bool:
         """Compare the leading set with those that lack one member, each at its own optimum; whether one is better.

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
-from .evidence import Normal, factored
+from .evidence import Definite, Normal, factored
 from .model import Block
 from .whitening import OUTLIER, autoregression, filtered, whiten
 
@@ -105,57 +104,28 @@ def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
     return rows if weights is None else filtered(rows, weights.usable, weights.coefficients, weights.variance)
 
 
-@dataclass
-class Noise:
-    """What noise in the regressors adds to a block's normal matrix, from one more draw of the sensors' noise.
-
-    ``gram`` products of what that draw changes the columns ``names`` and the residual (last) by; ``values`` of these
-    columns' parameters where they were taken.
-    """
-
-    names: list[str]
-    gram: np.ndarray
-    values: np.ndarray
-
-
-def noise_of(
-    white: White, block: Block, disturbed: Block, weights: Weights | None, values: Mapping[str, float]
-) -> Noise:
-    """Products of what a second draw of the noise changes: to the first order as much as the first draw did.
-
-    Fuller 1987, Measurement Error Models, section 2.2.
-    """
-    changes = {
-        n: disturbed.columns.get(n, 0.0) - block.columns[n] for n in white.names if n in block.columns
-    }  # fmt: skip
-    names = [n for n, change in changes.items() if np.any(change)]
-    raw = columns_of([*(changes[n] for n in names), disturbed.residual - block.residual], len(block.residual))
-    rows = _weighed(whiten(block.bands, block.usable, raw), weights)
-    index = {n: k for k, n in enumerate(white.names)}
-    power = np.diag(white.gram)[[index[n] for n in names]]
-    noise = (rows[:, :-1] ** 2).sum(axis=0)
-    rows[:, :-1] *= np.minimum(1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
-    return Noise(names, rows.T @ rows, np.array([values.get(n, 0.0) for n in names]))
-
-
-def correct(white: White, noise: Noise, values: Mapping[str, float]) -> None:
+def correct(white: White, block: Block, disturbed: Block, weights: Weights | None) -> None:
     """Take out of a normal matrix what the noise in the regressors adds to it, in place.
 
-    At another point than that of ``noise`` the residual has what its columns' noise makes of the difference.
+    To the first order a second draw of the noise changes the columns and the residual as the first did; the products
+    of these changes with one another are what noise adds on average (Fuller 1987, Measurement Error Models, section
+    2.2).
     """
-    moved = np.array([values.get(n, 0.0) for n in noise.names]) - noise.values
-    gram = noise.gram.copy()
-    gram[:-1, -1] += noise.gram[:-1, :-1] @ moved
-    gram[-1, :-1] = gram[:-1, -1]
-    gram[-1, -1] += 2.0 * noise.gram[-1, :-1] @ moved + moved @ noise.gram[:-1, :-1] @ moved
-    index = {n: k for k, n in enumerate(white.names)}
-    there = [k for k, n in enumerate(noise.names) if n in index]
-    into = [index[noise.names[k]] for k in there]
     last = len(white.names)
+    changes = {
+        k: disturbed.columns.get(n, 0.0) - block.columns[n] for k, n in enumerate(white.names) if n in block.columns
+    }
+    changes[last] = disturbed.residual - block.residual
+    changed = [k for k, change in changes.items() if np.any(change)]
+    raw = columns_of([changes[k] for k in changed], len(block.residual))
+    rows = _weighed(whiten(block.bands, block.usable, raw), weights)
+    noise = (rows**2).sum(axis=0)
+    power = np.diag(white.gram)[changed]
+    most = np.where(np.array(changed) == last, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
+    rows *= np.minimum(1.0, most)
     own = white.gram[-1, -1]  # the same for all hypotheses
-    source, target = [*there, len(noise.names)], [*into, last]
-    white.gram[np.ix_(target, target)] -= gram[np.ix_(source, source)]
-    white.own = float(gram[-1, -1])
+    white.gram[np.ix_(changed, changed)] -= rows.T @ rows
+    white.own = own - float(white.gram[-1, -1])
     white.gram[-1, -1] = own
     white.gram = _definite(white.gram)
 
@@ -202,7 +172,7 @@ def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]
     normal = assemble(whites, names, {})
     mean, sd = np.array([prior.get(n, (0.0, OWN_FORM if n.startswith("own.") else 1.0)) for n in names]).T
     A = normal.H * np.outer(sd, sd) + np.eye(len(names))
-    d = mean + sd * cho_solve(cho_factor(A), -(normal.g + normal.H @ mean) * sd)
+    d = mean + sd * Definite(A).solve(-(normal.g + normal.H @ mean) * sd)
     return dict(zip(names, d.tolist(), strict=True))
 
 

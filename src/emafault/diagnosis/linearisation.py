@@ -1,11 +1,11 @@
 """One recording linearised at a point: its blocks made white, weighed and compressed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from .linear import Noise, Weights, White, compressed, correct, noise_of, weights_from, white_rows
+from .linear import Weights, White, compressed, correct, weights_from, white_rows
 from .model import Block
 
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
@@ -17,8 +17,8 @@ class Task:
     """What is to be linearised: where, by which columns, with which equations' remainders (None: all).
 
     ``own``: sizes of the units that carry their own form; ``full``: deviations of a full model at this very task, from
-    whose residual the weights are renewed, and with them what noise in the regressors adds; ``again`` says that a pass
-    with ``full`` follows.
+    whose residual the weights are renewed; ``again`` says that a pass with ``full`` follows; ``corrected`` takes out
+    what the noise in the regressors adds.
     """
 
     values: Mapping[str, float]
@@ -27,17 +27,11 @@ class Task:
     own: Mapping[str, Mapping[str, float]] | None = None
     full: Mapping[str, float] | None = None
     again: bool = False
-
-
-@dataclass
-class Carried:
-    """What a recording keeps between passes: the weights of its blocks and the noise in their regressors."""
-
-    weights: dict[str, Weights] = field(default_factory=dict)
-    noise: dict[str, Noise] = field(default_factory=dict)
+    corrected: bool = True
 
 
 Parts = tuple[list[Block], list[tuple[list[str], np.ndarray]]]
+Carried = dict[str, Weights]  # of a recording's blocks, by equation
 
 
 class Linearisation:
@@ -47,27 +41,19 @@ class Linearisation:
         self.machine = machine
         self.kept: dict[str, Parts] = {}
 
-    def compress(self, task: Task, recording: str, carried: Carried) -> tuple[list[White], Carried]:
-        """Normal matrices of a recording's blocks, and what it carries from here on."""
+    def compress(self, task: Task, recording: str, weights: Carried) -> tuple[list[White], Carried]:
+        """Normal matrices of a recording's blocks, and its weights from here on."""
         blocks, parts = self.kept.pop(recording) if recording in self.kept else self._white(task, recording)
-        if task.again:
-            if self._size() + _size(parts) < KEPT:
-                self.kept[recording] = blocks, parts
-        elif task.full is not None:
-            weights = {b.equation: weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
-            carried = Carried(weights)
-        out = [compressed(b, *p, carried.weights.get(b.equation)) for b, p in zip(blocks, parts, strict=True)]
-        if task.again:
-            return out, carried
+        if task.again and self._size() + _size(parts) < KEPT:
+            self.kept[recording] = blocks, parts
         if task.full is not None:
+            weights = {b.equation: weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
+        out = [compressed(b, *p, weights.get(b.equation)) for b, p in zip(blocks, parts, strict=True)]
+        if task.corrected:
             disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=set(task.wanted))
             for white, block, other in zip(out, blocks, disturbed, strict=True):
-                of = carried.weights.get(block.equation)
-                carried.noise[block.equation] = noise_of(white, block, other, of, task.values)
-        for white in out:
-            if white.equation in carried.noise:
-                correct(white, carried.noise[white.equation], task.values)
-        return out, carried
+                correct(white, block, other, weights.get(block.equation))
+        return out, weights
 
     def _white(self, task: Task, recording: str) -> Parts:
         blocks = self.machine.blocks(task.values, recording, wanted=set(task.wanted))

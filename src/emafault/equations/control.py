@@ -6,14 +6,14 @@ random walk out that the integral makes of the sensors' noise.
 """
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.commands import with_corners
 from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
-from .signals import SPEED_SPAN
+from .signals import SPEED_SPAN, odd
 from .terms import with_hook
 from .torque import UNRESOLVED
 
@@ -34,13 +34,16 @@ def residual(state: State) -> Dual:
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
     model = np.asarray(value_of(position.shaft_angle(state)))
-    output = model + uniform_filter1d(rec.output - model, max(1, round(AVERAGED / h)), mode="nearest")
+    output = model + uniform_filter1d(rec.output - model, odd(AVERAGED / h), mode="nearest")
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
-    seen = model + uniform_filter1d(rec.speed_recorded - model, max(1, round(AVERAGED / h)), mode="nearest")
+    seen = model + uniform_filter1d(rec.speed_recorded - model, odd(AVERAGED / h), mode="nearest")
     wanted = p("controller.position_gain") * (a.gear_ratio * (_commanded(rec, lead) - _at_ticks(output, h, lead)))
-    error = clip(wanted, p("controller.speed_limit")) - _centred(seen, h, lead)
-    # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them
-    integral = error.linear(lambda x: np.cumsum(x) * h, rec.size)
+    # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
+    asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
+    error = asked - _centred(seen, h, lead)
+    # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them. It holds the
+    # present sample too, which makes up for the time that a demand is in force
+    integral = error.linear(lambda x: np.cumsum(x) * h + (lead - 0.5 * h) * x, rec.size)
     demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
     late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
@@ -49,7 +52,11 @@ def residual(state: State) -> Dual:
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
     pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
     width = block_length(rec)
-    return (pair - demand).linear(lambda x: _blocks(x, width), rec.size)
+    return (_calmed(pair, h) - demand).linear(lambda x: _blocks(x, width), rec.size)
+
+
+def _calmed(x: np.ndarray, h: float) -> np.ndarray:
+    return uniform_filter1d(x, odd(SPEED_SPAN / h), mode="nearest")
 
 
 def _at_limit(rec) -> np.ndarray:
@@ -104,7 +111,7 @@ def late(state: State) -> np.ndarray:
     rec = state.rec
     width = block_length(rec)
     level = 0.5 * np.abs(rec.current).sum(axis=1) * np.sign(state.drive)
-    rate = np.gradient(uniform_filter1d(level, max(1, round(BLOCK / rec.interval)), mode="nearest"), rec.interval)
+    rate = np.gradient(uniform_filter1d(level, odd(BLOCK / rec.interval), mode="nearest"), rec.interval)
     return USUAL_DELAY * _blocks(rate, width) / np.sqrt(noise_bands(state)[0])
 
 
@@ -114,7 +121,8 @@ def usable(state: State) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    free = ~(_at_limit(rec) | _without_headroom(rec))[: count * width].reshape(count, width).any(axis=1)
+    limited = binary_dilation(_at_limit(rec) | _without_headroom(rec), iterations=odd(SPEED_SPAN / rec.interval))
+    free = ~limited[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean
     level = 0.5 * np.abs(rec.current).sum(axis=1)[: count * width].reshape(count, width)
     known = moving & free & (level.min(axis=1) > rec.actuator.hysteresis)
@@ -131,7 +139,7 @@ def noise_bands(state: State) -> list[np.ndarray]:
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2
     bands: list[np.ndarray | float] = [white[1:] + white[:-1], -white[1:-1]]
-    averaged, calm = max(1, round(AVERAGED / h)), max(1, round(SPEED_SPAN / h))
+    averaged, calm = odd(AVERAGED / h), odd(SPEED_SPAN / h)
     size = 2 * (averaged + calm) + 8 * width
     impulse = np.zeros(size)
     impulse[(averaged + calm) // 2 + width] = 1.0

@@ -11,6 +11,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, placebo, rms, rows
+from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit, is_parameter
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model, Search
@@ -299,7 +300,7 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
         n += [x for x in index if x.startswith("remainder.control.")]
     k = np.array([index[x] for x in n])
     prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
-    covariance = np.linalg.inv(fit.normal.H[np.ix_(k, k)] + np.diag(prior))
+    covariance = Definite(fit.normal.H[np.ix_(k, k)] + np.diag(prior)).solve(np.eye(len(k)))
     out = {}
     for name, units in CONTROLLER.items():
         full = f"controller.{name}"
@@ -333,7 +334,7 @@ def _spreads(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     k = np.array([fit.normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
     A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
-    return dict(zip(names, (np.sqrt(np.diag(np.linalg.inv(A))) * sd).tolist(), strict=True))
+    return dict(zip(names, (np.sqrt(np.diag(Definite(A).solve(np.eye(len(k))))) * sd).tolist(), strict=True))
 
 
 def _faults(bench: Bench, recordings, before: Mapping, after: Mapping, spreads: Mapping) -> dict[str, dict]:

@@ -18,7 +18,7 @@ FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
-TIMING = 0.5  # of an interval and of a control period, by which means and samples within it may be told apart
+TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
@@ -87,7 +87,7 @@ class ReferenceActuator:
                 out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
             out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
             full = f"controller.timing@{name}"
-            out[full] = Parameter(full, 0.0, 0.0, TIMING * (rec.interval + a.control_period), "s")
+            out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
             if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
                 for j in PER_PHASE:
                     full = f"rounded.{j}@{name}"

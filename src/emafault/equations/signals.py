@@ -55,7 +55,7 @@ class Signals:
         self.middle = 0.5 * (theta + self.before)
         self.half_sweep = 0.5 * (theta - self.before)
         self.rate = (theta - self.before) / h
-        span = max(1, round(SPEED_SPAN / h))
+        span = odd(SPEED_SPAN / h)
         self.speed = uniform_filter1d(self.rate, span, mode="nearest")
         self.calm = uniform_filter1d(theta, span, mode="nearest")
         self.calm_before = np.concatenate([self.calm[:1], self.calm[:-1]])
@@ -67,7 +67,7 @@ class Signals:
         self.start = self._start_angle()
         self.turned = theta - self.start
         self.shaft = 0.5 * (theta + self.before - 2.0 * self.start) / self.actuator.gear_ratio
-        slow = uniform_filter1d(self.rate, max(3, round(3e-3 / h)), mode="nearest")
+        slow = uniform_filter1d(self.rate, odd(3e-3 / h), mode="nearest")
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
         self.speed_step = lattice_step(self.speed_recorded)
@@ -102,6 +102,11 @@ class Signals:
         out.speed_step, out.current_step = self.speed_step, self.current_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
         return out
+
+
+def odd(samples: float) -> int:
+    """Length of a centred average: an even one would be half a sample late."""
+    return 2 * int(0.5 * samples) + 1
 
 
 def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> SensorNoise:
