@@ -13,6 +13,7 @@ OWN = slice(1, 14)  # functions that an effect's own form is made of
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
+FEW = 30  # rows
 ROUNDING = 1e-10  # of a unit diagonal
 
 
@@ -179,13 +180,15 @@ def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]
 def weights_from(block: Block, names: Sequence[str], rows: np.ndarray, deviations: Mapping[str, float]) -> Weights:
     """Weights of a block from what a full model's deviations leave of its white rows; common to all hypotheses."""
     usable = block.usable
-    if usable.sum() < 30:
-        return Weights(np.zeros_like(usable), np.zeros(0), 1.0)
+    if not usable.any():
+        return Weights(usable, np.zeros(0), 1.0)
     left = rows[:, :-1] @ np.array([deviations.get(n, 0.0) for n in names]) + rows[:, -1]
     scale = np.median(np.abs(left[usable])) / 0.6745
     out = usable & (np.abs(left) > OUTLIER * max(scale, 1e-12))
     keep = usable & ~(out | np.roll(out, 1))
     if keep.sum() < 0.5 * usable.sum():
         keep = usable
+    if keep.sum() < FEW:  # no spectrum: the noise as stated, or more
+        return Weights(keep, np.zeros(0), max(float(np.mean(left[keep] ** 2)), 1.0))
     coefficients, variance = autoregression(np.where(keep, left, 0.0), keep)
     return Weights(keep, coefficients, max(variance, 1e-6))

@@ -26,7 +26,7 @@ NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
 def residual(state: State) -> Dual:
-    """Mean pair current less the demand (A), (block,), differenced."""
+    """Mean pair current less the demand (A), (block,), differenced; over the speed loop's gain, times the nominal one."""
     rec, a, p = state.rec, state.rec.actuator, state.p
     h = rec.interval
     # a demand is in force for one control period from the instant its inputs are sampled
@@ -44,15 +44,18 @@ def residual(state: State) -> Dual:
     # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them. It holds the
     # present sample too, which makes up for the time that a demand is in force
     integral = error.linear(lambda x: np.cumsum(x) * h + (lead - 0.5 * h) * x, rec.size)
-    demand = p("controller.speed_gain") * error + p("controller.speed_integral_gain") * integral
+    gain = p("controller.speed_gain")
+    # solved for the speed's error, which the noise lies on: a smaller gain must not make the noise smaller
+    asked_for = error + p("controller.speed_integral_gain") / gain * integral
     late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
-    demand = demand - late * np.gradient(np.asarray(demand.value), h)
+    asked_for = asked_for - late * np.gradient(np.asarray(asked_for.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
     pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
     width = block_length(rec)
-    return (_calmed(pair, h) - demand).linear(lambda x: _blocks(x, width), rec.size)
+    out = a.speed_gain * (_calmed(pair, h) / gain - asked_for)
+    return out.linear(lambda x: _blocks(x, width), rec.size)
 
 
 def _calmed(x: np.ndarray, h: float) -> np.ndarray:
