@@ -9,10 +9,12 @@ import numpy as np
 
 from .dual import Dual
 from .point import State, effect_name
+from .signals import UNRESOLVED
 from .terms import with_hook
 
 EDGE = np.pi / 6.0
 REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors may move it by
+PASSING = 0.3  # of the time in which a current passes over, that it is uncertain by (measured without noise)
 LONGEST = 0.35  # of an interval, that a current may take to pass over
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
@@ -39,23 +41,12 @@ def _sweep(rec, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def residual(state: State) -> Dual:
     """Mean current of the phase less its share (A), intervals of phase a, then b, then c."""
-    rec, p = state.rec, state.p
     out: list[Dual] = []
     for j in range(3):
-        rows = rows_of(state, j)
-        low, high, _ = (x[rows] for x in _sweep(rec, j))
-        early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
-        for m in with_hook("commutation"):
-            early = early + m.commutation(p.of(effect_name(m)), j)
+        rows, low, high, edge = _edges(state, j)
         stays, own = (np.asarray(state.current[q].value)[rows] for q in (STAYS[j], j))
-        time = p("controller.commutation_time") + p("controller.commutation_slope") * np.abs(stays)
-        time = time + p(f"controller.commutation_time_{'abc'[j]}")
-        w = rec.actuator.back_emf * np.abs(rec.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
-        time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * np.abs(stays)) * w
-        edge = time * (rec.actuator.pole_pairs * rec.speed[rows]) - early
-        width = high - low
         inside = (edge.value > low) & (edge.value < high)
-        share = (high - edge) * (1.0 / width)
+        share = (high - edge) * (1.0 / (high - low))
         share = share.kept(inside) + np.where(edge.value <= low, 1.0, 0.0)
         out.append(own + share * stays)
     names = {n for d in out for n in d.slopes}
@@ -67,8 +58,35 @@ def residual(state: State) -> Dual:
     return Dual(np.concatenate([np.atleast_1d(d.value) for d in out]), slopes)
 
 
-def noise_bands(state: State, count: int) -> list[np.ndarray]:
-    """Diagonal of the noise's covariance (A2): the sensors', and where the edge falls on the switching ripple."""
-    rec = state.rec
-    ripple = 0.15 * rec.actuator.hysteresis * min(1.0, 5e-5 / rec.interval)
-    return [np.full(count, 2.0 * rec.noise.current**2 + ripple**2)]
+def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Dual]:
+    """Intervals of phase j, their ends from the nominal edge, and where the current passes over (electrical rad)."""
+    rec, p = state.rec, state.p
+    rows = rows_of(state, j)
+    low, high, _ = (x[rows] for x in _sweep(rec, j))
+    early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
+    for m in with_hook("commutation"):
+        early = early + m.commutation(p.of(effect_name(m)), j)
+    stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])
+    time = p("controller.commutation_time") + p("controller.commutation_slope") * stays
+    time = time + p(f"controller.commutation_time_{'abc'[j]}")
+    w = rec.actuator.back_emf * np.abs(rec.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
+    time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * stays) * w
+    edge = time * (rec.actuator.pole_pairs * rec.speed[rows]) - early
+    return rows, low, high, edge
+
+
+def noise_bands(state: State) -> list[np.ndarray]:
+    """Diagonal of the noise's covariance (A2): the sensors', when within the ripple a current passes over, and where a
+    current that changes does so within an interval."""
+    rec, a = state.rec, state.rec.actuator
+    change = rec.rows_from.current_change
+    out = []
+    for j in range(3):
+        rows, low, high, edge = _edges(state, j)
+        stays = np.abs(rec.current[rows, STAYS[j]])
+        scatter = a.inductance / a.bus_voltage * (a.hysteresis + PASSING * stays)  # s
+        reach = a.pole_pairs * np.abs(rec.speed[rows]) * scatter
+        inside = (edge.value > low - reach) & (edge.value < high + reach)
+        passing = inside * (scatter / rec.interval * stays) ** 2
+        out.append(2.0 * rec.noise.current**2 + passing + (UNRESOLVED * change[rows]) ** 2)
+    return [np.concatenate(out)]

@@ -13,9 +13,8 @@ from . import position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
-from .signals import SPEED_SPAN, odd
+from .signals import SPEED_SPAN, UNRESOLVED, odd
 from .terms import with_hook
-from .torque import UNRESOLVED
 
 BLOCK = 2e-3  # s
 AVERAGED = 1e-2  # s
@@ -26,7 +25,7 @@ NEAR_LIMIT = 0.4  # of the current limit, beyond which a row may be limited
 
 
 def residual(state: State) -> Dual:
-    """Mean pair current less the demand (A), (block,), differenced; over the speed loop's gain, times the nominal one."""
+    """Mean pair current less the demand (A), (block,), differenced; over the speed gain, times the nominal one."""
     rec, a, p = state.rec, state.rec.actuator, state.p
     h = rec.interval
     # a demand is in force for one control period from the instant its inputs are sampled

@@ -26,15 +26,16 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
             g = start + (k + 0.5) * h * rate
             gap = g - x
             side = 1.0 if gap > 0.5 * play else (-1.0 if gap < -0.5 * play else 0.0)
-            if side == 0.0:
-                v -= h * ground * v / J
-                push = 0.0
-            else:
-                # implicit in the speed: C/J is fast against the step where both are large
-                twist = gap - 0.5 * side * play
-                v = (v + h * (K * (twist - 0.5 * h * v) + C * rate) / J) / (1.0 + h * (C + ground) / J)
-                push = K * twist + C * (rate - v)
-            x += h * v
+            stiffness, damping = (K, C) if side != 0.0 else (0.0, 0.0)
+            # implicit midpoint rule: second order, and stable however fast the damping is
+            twist = gap - 0.5 * side * play
+            half = 0.5 * h / J
+            middle = (v + half * (stiffness * twist + damping * rate)) / (
+                1.0 + half * (0.5 * h * stiffness + damping + ground)
+            )
+            push = stiffness * (twist - 0.5 * h * middle) + damping * (rate - middle)
+            x += h * middle
+            v = 2.0 * middle - v
             total += push
         start = gear[m]
         position[m], torque[m] = x, total / steps

@@ -202,7 +202,7 @@ class ReferenceActuator:
         turning = commutation.residual(state)
         count = np.size(turning.value)
         if count > 20:
-            found.append(("commutation", turning, commutation.noise_bands(state, count), np.ones(count, bool)))
+            found.append(("commutation", turning, commutation.noise_bands(state), np.ones(count, bool)))
         blocks = []
         for name, r, bands, usable in found:
             columns = dict(r.slopes)

@@ -14,6 +14,7 @@ from ..recording import Recording
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
+UNRESOLVED = 0.2  # of the change from interval to interval: where within one a signal changes is not recorded
 SLOW = 2.0  # rad/s, below which dry friction has no known sign
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
@@ -70,6 +71,9 @@ class Signals:
         slow = uniform_filter1d(self.rate, odd(3e-3 / h), mode="nearest")
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
+        level = 0.5 * np.abs(self.current).sum(axis=1)
+        step = np.abs(np.diff(level, append=level[-1:]))
+        self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
         self.speed_step = lattice_step(self.speed_recorded)
         self.current_step = max(lattice_step(x) for x in self.current.T)
         self.nominal_play = self.actuator.backlash

@@ -8,9 +8,8 @@ import numpy as np
 
 from .dual import Dual
 from .point import State, effect_name
+from .signals import UNRESOLVED
 from .terms import with_hook
-
-UNRESOLVED = 0.2  # of the change from interval to interval: where within one a torque changes is not recorded
 
 
 def net_torque(state: State) -> Dual:
@@ -18,6 +17,7 @@ def net_torque(state: State) -> Dual:
     rec, a = state.rec, state.rec.actuator
     drive = [state.k[j] * state.conducting[j] * state.current[j] for j in range(3)]
     state.drive = sum((np.asarray(d.value) for d in drive), np.zeros(rec.size))
+    state.shared = state.drive
     level: Dual | float = a.coulomb_friction
     for m in with_hook("friction"):
         level = level * m.friction(state.p.of(effect_name(m)), rec)
@@ -26,7 +26,9 @@ def net_torque(state: State) -> Dual:
         viscous = viscous * m.viscous(state.p.of(effect_name(m)))
     net = drive[0] + drive[1] + drive[2] - viscous * rec.speed - level * rec.direction
     for m in with_hook("torque"):
-        net = net - m.torque(state.p.of(effect_name(m)), rec)
+        load = m.torque(state.p.of(effect_name(m)), rec)
+        net = net - load
+        state.shared = state.shared - np.asarray(load.value)
     return net
 
 
@@ -36,6 +38,8 @@ def residual(state: State) -> Dual:
     inertia: Dual | float = 1.0
     for m in with_hook("inertia"):
         inertia = inertia * m.inertia(state.p.of(effect_name(m)))
+    state.rotor_share = float(np.prod([m.rotor_share(state.p.of(effect_name(m))) for m in with_hook("rotor_share")]))
+    inertia = inertia * state.rotor_share
     balance = net_torque(state) / inertia
     theta = rec.angle
     second = np.zeros(rec.size)
@@ -62,12 +66,12 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((N m)2)."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
     angle = (a.inertia * s.angle / rec.interval**2) ** 2
-    current = 2.0 * (a.back_emf * s.current) ** 2
+    current = 2.0 * (a.back_emf * s.current / state.rotor_share) ** 2
     n = rec.size
-    change = np.abs(np.diff(state.drive, append=state.drive[-1:]))
+    change = np.abs(np.diff(state.shared, append=state.shared[-1:]))
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     return [
-        6.0 * angle + 0.5 * current + (UNRESOLVED * change) ** 2,
+        6.0 * angle + 0.5 * current + (UNRESOLVED / state.rotor_share * change) ** 2,
         np.full(n - 1, -4.0 * angle + 0.25 * current),
         np.full(n - 2, angle),
     ]

@@ -14,7 +14,7 @@ KEPT = 12  # solutions of a recording
 
 
 def solve(rec, flexibility, damping, play, scale):
-    """User angle (rad) and torque on the motor less that of a rigid shaft (N m) along the measured rotor angle.
+    """User angle (rad) and torque on the motor (N m) along the measured rotor angle.
 
     ``scale`` of this unit's inertia, which the user shaft has its share of.
     """
@@ -25,7 +25,12 @@ def solve(rec, flexibility, damping, play, scale):
     position, torque = flexible_shaft(
         rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
     )
-    return position, torque / a.gear_ratio - SHARE * scale * a.inertia * rec.acceleration
+    return position, torque / a.gear_ratio
+
+
+def rotor_share(p):
+    """Share of the inertia that turns with the rotor."""
+    return 1.0 - SHARE if p("flexibility").value >= STIFFEST else 1.0
 
 
 def twist(p, rec, rigid, play):
@@ -34,7 +39,7 @@ def twist(p, rec, rigid, play):
 
 
 def torque(p, rec):
-    """Torque on the motor beyond the rigid shaft's inertia (N m)."""
+    """Torque of the shaft on the motor (N m)."""
     return _dual(p, rec, 1, None, rec.nominal_play)
 
 
