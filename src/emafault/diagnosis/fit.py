@@ -285,6 +285,7 @@ class Bench:
                 plain = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
+                    np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain
                 if len(own):
@@ -298,6 +299,10 @@ class Bench:
                 [reduced.names[k] for k in index],
             )  # fmt: skip
         return [*self.units, *self.remainders.values()], out
+
+    def _tolerance(self, p: Parameter) -> float:
+        """Tolerance of the quantity that a parameter is beyond, as a share of the parameter's prior."""
+        return self.parameters[p.alias].sd / p.sd if p.alias is not None else 0.0
 
     # ---- the whole
     def move(self, model: Model, normal: Normal) -> tuple[float, float]:

@@ -32,6 +32,7 @@ class Variant:
     parameters: Sequence[Parameter]
     signs: Sequence[int] = ()
     least: float = 0.0  # width of the prior, as a share of the parameters' own, below which the unit never is
+    hole: Sequence[float] = ()  # prior standard deviations from off, within which not all parameters may be at once
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..actuator.compiled import compiled
 from .evidence import Reduced, factored, log_evidence
@@ -17,6 +18,7 @@ WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
 OTHER_FORM = 10  # added to a variant's number where the unit takes a form of its own beside the library's
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
+TINY = 1e-12  # probability that counts as none
 BEAM = 4
 ADDED = 15  # units tried in addition to a set
 SWAPPED = 5  # units tried in the place of each member
@@ -58,6 +60,8 @@ class Candidate:
     signs: np.ndarray
     widths: tuple[float, ...]
     names: list[str]
+    hole: np.ndarray = field(default_factory=lambda: np.zeros(0))  # prior standard deviations, see ``Variant``
+    within: np.ndarray = field(default_factory=lambda: np.zeros(0))  # tolerance, in the same
     extra: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # own form
     extra_sd: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
@@ -100,6 +104,9 @@ class Search:
                 best, width = self._widen(members, m, width, best)
         value, index, mean, deviation = best
         value += sum(self.corrections.get(m[0], 0.0) for m in members)
+        value += sum(
+            self._outside(m, width[m], index, mean, deviation) for m in members if len(self.candidates[m].hole)
+        )
         value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
         value -= sum(np.log(self.variants(m[0])) for m in members)
         names = [self.reduced.names[k] for k in index]
@@ -145,6 +152,19 @@ class Search:
             if moved:
                 break
         return best, width
+
+    def _outside(self, m, width, index, mean, deviation) -> float:
+        """Log of the posterior over the prior mass outside a prior's hole: of a unit's values beyond tolerance."""
+        c = self.candidates[m]
+        k = np.searchsorted(np.sort(index), c.index)
+        k = np.argsort(index)[k]
+        # the tolerance has taken its own share of the deviation
+        more = 1.0 + (c.within / width) ** 2
+        x = (mean[k] - self.reduced.fixed[c.index]) / c.sd * more
+        s = np.maximum(deviation[k] / c.sd * more, 1e-9)
+        inside = ndtr((c.hole - x) / s) - ndtr((-c.hole - x) / s)
+        before = 1.0 - 2.0 * ndtr(-c.hole / width)
+        return float(np.log(np.maximum(1.0 - np.prod(inside), TINY)) - np.log(1.0 - np.prod(before)))
 
     def variants(self, unit: str) -> int:
         """Number of variants of a unit, wherever the point is."""

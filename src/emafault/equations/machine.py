@@ -18,14 +18,14 @@ FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
-TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
+TIMING = 1.0  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
-OUTSIDE = 3.0  # tolerances, that a unit named for its calibration lies beyond what is usual
+OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
 
 
@@ -119,8 +119,8 @@ class ReferenceActuator:
                 parameters.append(
                     Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off))
                 )
-            least = min(OUTSIDE * self.parameters[p.alias or ""].sd / p.sd for p in parameters)
-            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), least)])
+            hole = [OUTSIDE * self.parameters[p.alias or ""].sd / p.sd for p in parameters]
+            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), min(hole), hole)])
         internal = _internal(effect)
         for name, q in internal.items():
             full = f"{effect.id}.{name}"
