@@ -45,10 +45,10 @@ def test_imports_nothing_of_the_diagnosis():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or "", *(a.name for a in node.names)] if isinstance(node, ast.ImportFrom) else []
-            assert not {"gap", "twins"} & {part for name in names for part in name.split(".")}, path.name
+            assert not {"gap", "twins", "equations", "diagnosis", "study"} & {part for name in names for part in name.split(".")}, path.name
 
 
-@pytest.mark.parametrize("rung", ["T0", "T1", "T2", "T3", "T4"])
+@pytest.mark.parametrize("rung", RUNGS)
 def test_a_case_is_its_seed(rung):
     case = draw_case(rung, 137)
     assert case == draw_case(rung, 137)
@@ -118,7 +118,7 @@ def test_health_means_what_the_format_says():
 
 def test_unknown_rung():
     with pytest.raises(InputError, match="rung"):
-        draw_case("T9", 0)
+        draw_case("T5", 0)
 
 
 def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):

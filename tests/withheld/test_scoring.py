@@ -114,14 +114,20 @@ def test_ladder_and_fault_vector():
     assert row["features"] is None
     assert row["fault_vector"]["before"] == pytest.approx(0.4**2)
     assert row["fault_vector"]["after"] == pytest.approx(0.0)
-    assert row["fault_vector"]["oracle"] == pytest.approx(6 * 0.01**2)
+    assert row["fault_vector"]["bound"] == pytest.approx(6 * 0.01**2)
+    assert row["fault_vector"]["oracle"] is None  # no told diagnosis was run
     told = {"fault_vector": {"recording_0.nc": {"after": faults(0.03, 30.0)}}}
     verdict = verdict_of("explained", [(["cogging"], 1.0)], fault_vector=vectors)
     assert judge(key_of(COGGING), verdict, told)["fault_vector"]["oracle"] == pytest.approx(0.01)
     values = {m["id"]: m["value"] for m in score_rows([row])["metrics"]}
+    assert values["closed_faults"] is None and values["fault_ratio"] is None
+    assert values["closed_faults_bound"] == pytest.approx(0.16 / (0.16 - 6e-4))
+    row = judge(key_of(COGGING), verdict, told)
+    row["signal"] = {"recalibrated": 9.0, "placebo": 2.9**2, "after": 1.1**2, "floor": 1.0}
+    values = {m["id"]: m["value"] for m in score_rows([row])["metrics"]}
     assert values["closed_signal"] == pytest.approx((9.0 - 1.21) / 8.0)
     assert values["placebo"] == pytest.approx((9.0 - 2.9**2) / 8.0)
-    assert values["closed_faults"] == pytest.approx(0.16 / (0.16 - 6e-4))
+    assert values["closed_faults"] == pytest.approx(0.16 / (0.16 - 0.01))
     assert values["fault_ratio"] == pytest.approx(0.0)
 
 

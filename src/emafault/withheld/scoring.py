@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from ..effects import EFFECTS
+from .described import change_without
 from .verdicts import IN_GROUP, judge, read_verdict
 
 LEVEL = 0.90  # of the bootstrap intervals
@@ -81,25 +82,72 @@ def closure(kind: str, stage: str = "after") -> Callable[[Rows], float | None]:
     """Share of the closable gap that a stage of the ladder closes, ratio of sums over cases."""
 
     def of(rows: Rows) -> float | None:
-        ladders = [r[kind] for r in rows if r[kind]]
+        ladders = [r[kind] for r in rows if r[kind] and None not in r[kind].values()]
         below = sum(x["recalibrated"] - x["floor"] for x in ladders)
         return sum(x["recalibrated"] - x[stage] for x in ladders) / below if below > 0.0 else None
 
     return of
 
 
-def fault_closure(rows: Rows) -> float | None:
+def _errors(rows: Rows, against: str) -> list[dict]:
+    """Fault-vector errors of the cases that have an oracle's, or a bound's, to be held against."""
+    return [r["fault_vector"] for r in rows if r["fault_vector"] and r["fault_vector"][against] is not None]
+
+
+def fault_closure(against: str = "oracle") -> Callable[[Rows], float | None]:
     """Share of the closable fault-vector error that the diagnosis closes, ratio of sums."""
-    errors = [r["fault_vector"] for r in rows if r["fault_vector"]]
-    below = sum(e["before"] - e["oracle"] for e in errors)
-    return sum(e["before"] - e["after"] for e in errors) / below if below > 0.0 else None
+
+    def of(rows: Rows) -> float | None:
+        errors = _errors(rows, against)
+        below = sum(e["before"] - e[against] for e in errors)
+        return sum(e["before"] - e["after"] for e in errors) / below if below > 0.0 else None
+
+    return of
 
 
-def fault_ratio(rows: Rows) -> float | None:
-    """Root mean square fault-vector error once diagnosed, over the oracle's."""
-    errors = [r["fault_vector"] for r in rows if r["fault_vector"]]
-    below = sum(e["oracle"] for e in errors)
-    return float(np.sqrt(sum(e["after"] for e in errors) / below)) if below > 0.0 else None
+def fault_ratio(against: str = "oracle") -> Callable[[Rows], float | None]:
+    """Root mean square fault-vector error once diagnosed, over the oracle's or the bound."""
+
+    def of(rows: Rows) -> float | None:
+        errors = _errors(rows, against)
+        below = sum(e[against] for e in errors)
+        return float(np.sqrt(sum(e["after"] for e in errors) / below)) if below > 0.0 else None
+
+    return of
+
+
+def loss(rows: Rows) -> float | None:
+    """Share named on the same benches without what is unlisted, less the share named with it."""
+    pairs = [r for r in rows if "named_without" in r]
+    return float(np.mean([float(r["named_without"]) - float(r["all_named"]) for r in pairs])) if pairs else None
+
+
+def inclusion_change(quantile: float | None = None) -> Callable[[Rows], float | None]:
+    """Largest change of a plant effect's inclusion against the nominal controller: mean or quantile over cases."""
+
+    def of(rows: Rows) -> float | None:
+        moved = [r["inclusion_change"] for r in rows if r.get("inclusion_change") is not None]
+        if not moved:
+            return None
+        return float(np.mean(moved) if quantile is None else np.quantile(moved, quantile))
+
+    return of
+
+
+def _of_unlisted(field: str) -> Callable[[Rows], float | None]:
+    """Share of the things unlisted of which a field is true; those of which it is None are left out."""
+
+    def of(rows: Rows) -> float | None:
+        values = [u[field] for r in rows for u in r["unlisted"] if u[field] is not None]
+        return float(np.mean(values)) if values else None
+
+    return of
+
+
+def false_share(rows: Rows) -> float | None:
+    """Share of all descriptions that describe nothing that is there."""
+    total = sum(r["claims"] for r in rows)
+    return sum(r["false_claims"] for r in rows) / total if total else None
 
 
 def group_size(rows: Rows) -> float | None:
@@ -130,7 +178,7 @@ def _mixed(row: dict) -> bool:
 
 
 def _unknown_t3(row: dict) -> bool:
-    return row["rung"] == "T3" and row["detectable"] and row["answer"] == "unknown"
+    return row["rung"] == "T3" and row["detectable"] and row["answer"] in ("unknown", "described")
 
 
 def _apart(rows: Rows) -> float | None:
@@ -141,6 +189,27 @@ def _apart(rows: Rows) -> float | None:
     return float(np.mean(far))
 
 
+def _mix(row: dict, effects: int | None = 1, unlisted: int = 1) -> bool:
+    """Whether a row is a detectable one of T7 with so many effects and things unlisted; None: any other mix."""
+    if row["rung"] != "T7" or not row["detectable"]:
+        return False
+    found = len(row["truth"]), len(row["unlisted"])
+    return found != (1, 1) if effects is None else found == (effects, unlisted)
+
+
+def _mix_seen(row: dict) -> bool:
+    return _mix(row) and row["unlisted"][0]["detectable"]
+
+
+def _alone(inside: bool) -> Callable[[dict], bool]:
+    """Rows of T8 whose thing unlisted shows, inside the grammar or outside."""
+    return lambda r: r["rung"] == "T8" and r["unlisted"][0]["detectable"] and r["unlisted"][0]["inside"] == inside
+
+
+def _described(row: dict) -> bool:
+    return row["rung"] in ("T0", "T1", "T7", "T8")
+
+
 _right, _wrong = share("right"), share("wrong_name")
 _both = _rung("T1", "T2")
 _weak = _rung("T0", detectable=None, strong_faults=False)
@@ -149,6 +218,64 @@ METRICS = (
     Metric("right_t1", "right effect or group first, T1", _rung("T1"), _right, 0.95, 0.99),
     Metric("right_t4", "right effect or group first, T4", _rung("T4"), _right, 0.80, 0.95),
     Metric("pairs_t2", "two effects named exactly, T2", _count(2), _right, 0.85, 0.95),
+    Metric("named_t7", "listed effect named beside something unlisted, T7", _mix, share("all_named"), 0.90, 0.97),
+    Metric("beside_t7", "another listed name beside it, T7", _mix, share("another"), 0.03, 0.01, -1),
+    Metric("loss_t7", "loss against the same bench without it, T7", _mix, loss, 0.05, 0.02, -1),
+    Metric(
+        "several_t7",
+        "two unlisted or two effects: all listed named, T7",
+        lambda r: _mix(r, None),
+        share("all_named"),
+        0.80,
+        0.92,
+    ),
+    Metric(
+        "inclusion_t9",
+        "largest change of a plant effect's inclusion, T9",
+        _single("T9"),
+        inclusion_change(),
+        0.05,
+        0.02,
+        -1,
+    ),
+    Metric("same_t9", "verdict unchanged, T9", _single("T9"), share("same"), 0.97, 0.99),
+    Metric(
+        "form_t8",
+        "inside the grammar: form, equation, coordinate, T8",
+        _alone(True),
+        _of_unlisted("form_right"),
+        0.90,
+        0.97,
+    ),
+    Metric(
+        "parameters_t8",
+        "inside: its parameters within 10 %, T8",
+        _alone(True),
+        _of_unlisted("parameters_right"),
+        0.85,
+        0.95,
+    ),
+    Metric(
+        "equation_t8",
+        "outside the grammar: equation right, T8",
+        _alone(False),
+        _of_unlisted("equation_right"),
+        0.85,
+        0.95,
+    ),
+    Metric("wrong_t8", "outside: a listed name given, T8", _alone(False), share("another"), 0.03, 0.01, -1),
+    Metric("closed_t8_inside", "gap closed, signal, inside, T8", _alone(True), closure("signal"), 0.85, 0.97),
+    Metric("closed_t8_outside", "gap closed, signal, outside, T8", _alone(False), closure("signal"), 0.50, 0.75),
+    Metric(
+        "claimed",
+        "any form or equation claimed, T0 and T1",
+        _rung("T0", "T1", detectable=None),
+        share("claimed"),
+        0.03,
+        0.01,
+        -1,
+    ),
+    Metric("false_share", "false share of what is described", _described, false_share, 0.05, 0.02, -1),
     Metric("wrong_t0", "a wrong name on effect-free data, T0", _single("T0"), _wrong, 0.05, 0.01, -1),
     Metric("no_gap_t0", "no_gap returned, T0", _single("T0"), _right, 0.90, 0.97),
     Metric("wrong_t3", "left-out effect given a wrong name, T3", _rung("T3"), _wrong, 0.08, 0.02, -1),
@@ -156,13 +283,13 @@ METRICS = (
         "auroc_t3", "unknown against known, area under the ROC curve", _rung("T1", "T3"), area_under_curve, 0.93, 0.98
     ),
     Metric("equation_t3", "unknown placed in the right equation", _unknown_t3, share("equation_right"), 0.85, 0.97),
-    Metric("ece", "expected calibration error, T0, T1, T2", _mixed, calibration_error, 0.03, 0.015, -1),
+    Metric("ece", "expected calibration error, every case", lambda row: True, calibration_error, 0.03, 0.015, -1),
     Metric("coverage", "coverage of 90 % intervals, T1", _rung("T1"), coverage, (0.86, 0.94), (0.88, 0.92), 0),
     Metric("closed_signal", "gap closed, signal", _both, closure("signal"), 0.95, 0.99),
     Metric("closed_features", "gap closed, features", _both, closure("features"), 0.95, 0.99),
-    Metric("closed_faults", "gap closed, fault vector", _both, fault_closure, 0.90, 0.97),
+    Metric("closed_faults", "gap closed, fault vector", _both, fault_closure(), 0.90, 0.97),
     Metric("placebo", "the placebo's share of the signal's gap", _both, closure("signal", "placebo"), 0.25, 0.10, -1),
-    Metric("fault_ratio", "fault-vector error once diagnosed, over the oracle's", _both, fault_ratio, 1.3, 1.05, -1),
+    Metric("fault_ratio", "fault-vector error once diagnosed, over the oracle's", _both, fault_ratio(), 1.3, 1.05, -1),
     # beside the table
     Metric("right_t1_all", "right first, T1, every amplitude", _single("T1"), _right),
     Metric("right_t4_all", "right first, T4, every amplitude", _single("T4"), _right),
@@ -175,10 +302,25 @@ METRICS = (
     Metric("triples_t2", "three effects named exactly, T2", _count(3), _right),
     Metric("faults_t2", "one effect beside strong faults, T2", _count(1), _right),
     Metric("t2_all", "sets named exactly, T2, every amplitude", _single("T2"), _right),
-    Metric("unknown_t3", "unknown returned, T3", _rung("T3"), _right),
+    Metric("named_t7_seen", "listed effect named, T7, the thing unlisted shows", _mix_seen, share("all_named")),
+    Metric(
+        "beside_t7_seen", "another listed name, T7, the thing unlisted shows", _mix_seen, share("another"), sense=-1
+    ),
+    Metric("without_t7", "listed effect named without what is unlisted, T7", _mix, share("named_without")),
+    Metric("another_without_t7", "another name without it, T7", _mix, share("another_without"), sense=-1),
+    Metric("structural_t7", "another structural name beside, T7", _mix, share("another_structural"), sense=-1),
+    Metric(
+        "beside_all_t7", "another listed name, T7, every mix and amplitude", _single("T7"), share("another"), sense=-1
+    ),
+    Metric("inclusion_t9_95", "the same change, 95 % quantile, T9", _single("T9"), inclusion_change(0.95), sense=-1),
+    Metric("wrong_t9", "a wrong name, T9", _single("T9"), share("another"), sense=-1),
+    Metric("wrong_t8_inside", "inside the grammar: a listed name given, T8", _alone(True), share("another"), sense=-1),
+    Metric("unknown_t3", "unknown or described returned, T3", _rung("T3"), _right),
     Metric("apart_t3", "a wrong name that the data tell apart, T3", _rung("T3"), _apart, sense=-1),
     Metric("wrong_t3_all", "a wrong name, T3, every amplitude", _single("T3"), _wrong, sense=-1),
-    Metric("ece_all", "expected calibration error, every case", lambda row: True, calibration_error, sense=-1),
+    Metric("ece_known", "expected calibration error, T0, T1, T2", _mixed, calibration_error, sense=-1),
+    Metric("closed_faults_bound", "gap closed, fault vector, against the bound", _both, fault_closure("bound")),
+    Metric("fault_bound", "fault-vector error over the best possible", _both, fault_ratio("bound"), sense=-1),
     Metric("closed_signal_t4", "gap closed, signal, T4", _rung("T4"), closure("signal")),
     Metric("group_size", "mean size of a group, T1", _single("T1"), group_size, sense=-1),
 )
@@ -187,8 +329,8 @@ METRICS = (
 def score(folder: str | Path, seed: int = 0, processes: int = 1) -> dict:
     """Score what a folder holds: ``keys/NAME.json`` against ``diagnoses/NAME/diagnosis.json``.
 
-    ``oracles/NAME/diagnosis.json``, where present, is a diagnosis that was told the effect; else the best possible
-    error of the key stands for the oracle. Over so many ``processes`` the cases are shared out.
+    ``oracles/NAME/diagnosis.json``, where present, is a diagnosis that was told the effects. Over so many ``processes``
+    the cases are shared out.
 
     Returns
     -------
@@ -219,28 +361,43 @@ def _judged(key: Path) -> dict | None:
     return judge(json.loads(key.read_text()), read_verdict(verdict), told) | {"name": key.stem}
 
 
-def score_rows(rows: Rows, seed: int = 0) -> dict:
-    """Everything that the scoreboard shows, from judged rows."""
+def score_rows(every: Rows, seed: int = 0) -> dict:
+    """Everything that the scoreboard shows, from judged rows; plain twins are compared with and not counted."""
     rng = np.random.default_rng(seed)
+    rows = compared(every)
     return {
         "metrics": [_measure(metric, rows, rng) for metric in METRICS],
         "confusion": confusion(rows),
-        "reliability": reliability([r for r in rows if _mixed(r)]),
+        "reliability": reliability(rows),
         "power": power(rows),
+        "rivals": by_rival(rows),
         "hardest": hardest(rows),
         "by_effect": by_effect(rows),
-        "rows": list(rows),
+        "by_unlisted": by_unlisted(rows),
+        "rows": rows,
     }
 
 
+def compared(rows: Rows) -> list[dict]:
+    """Rows of the cases, each with what changes against its plain twin where it has one."""
+    plain = {r["bench"]: r for r in rows if r["plain"]}
+    cases = [r for r in rows if not r["plain"]]
+    return [r | change_without(r, plain[r["bench"]]) if r["bench"] in plain else r for r in cases]
+
+
 def _measure(metric: Metric, rows: Rows, rng: np.random.Generator) -> dict:
+    """Value of a metric with its interval, of benches drawn again: the cases of one bench are not independent."""
     chosen = [r for r in rows if metric.select(r)]
     value = metric.statistic(chosen)
     low = high = None
     if value is not None:
+        benches: dict[str, list[dict]] = {}
+        for r in chosen:
+            benches.setdefault(r["bench"], []).append(r)
+        each = list(benches.values())
         draws = []
         for _ in range(RESAMPLES):
-            again = metric.statistic([chosen[i] for i in rng.integers(0, len(chosen), len(chosen))])
+            again = metric.statistic([r for i in rng.integers(0, len(each), len(each)) for r in each[i]])
             if again is not None:
                 draws.append(again)
         low, high = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
@@ -268,7 +425,7 @@ def _met(metric: Metric, value: float | None, bound) -> bool | None:
 
 def _said(row: dict) -> str:
     """What a row's answer counts as in the confusion matrix."""
-    if row["answer"] in ("unknown", "no_gap"):
+    if row["answer"] in ("unknown", "no_gap", "described"):
         return str(row["answer"])
     if row["right"]:
         return str(row["truth"][0])
@@ -280,7 +437,7 @@ def _said(row: dict) -> str:
 
 def confusion(rows: Rows) -> dict:
     """Counts of what detectable single effects of T1 were called."""
-    labels = [*EFFECTS, "several", "wrong group", "unknown", "no_gap"]
+    labels = [*EFFECTS, "several", "wrong group", "described", "unknown", "no_gap"]
     counts = np.zeros((len(EFFECTS), len(labels)), int)
     for row in rows:
         if row["rung"] == "T1" and row["detectable"]:
@@ -315,6 +472,36 @@ def by_effect(rows: Rows) -> list[dict]:
             seen = [r for r in those if r["detectable"]]
             line[rung] = {"cases": len(those), "detectable": len(seen), "right": sum(bool(r["right"]) for r in seen)}
         out.append(line)
+    return out
+
+
+def by_unlisted(rows: Rows) -> list[dict]:
+    """Each thing unlisted: cases, how often the listed ones are named beside it, another beside, itself described."""
+    out = []
+    for name in sorted({u["name"] for r in rows for u in r["unlisted"]}):
+        those = [(r, u) for r in rows for u in r["unlisted"] if u["name"] == name]
+        mixed = [r for r, _ in those if r["rung"] == "T7" and r["detectable"]]
+        out.append(
+            {"unlisted": name, "inside": those[0][1]["inside"], "cases": len(those), "mixed": len(mixed),
+             "named": share("all_named")(mixed), "another": share("another")([r for r, _ in those]),
+             "equation": float(np.mean([u["equation_right"] for _, u in those])),
+             "form": float(np.mean([u["form_right"] for _, u in those]))}
+        )  # fmt: skip
+    return out
+
+
+def by_rival(rows: Rows) -> list[dict]:
+    """Share right and wrongly named of detectable single effects against the distance to their nearest rival."""
+    edges = [0.0, IN_GROUP, 25.0, 100.0, 1e3, np.inf]
+    known = [r for r in rows if r["rung"] in ("T1", "T4") and r["detectable"] and r["nearest_rival"]]
+    out = []
+    for low, high in pairwise(edges):
+        those = [r for r in known if low <= r["nearest_rival"]["distance"] < high]
+        if those:
+            out.append(
+                {"low": low, "high": None if np.isinf(high) else high, "cases": len(those),
+                 "right": share("right")(those), "wrong_name": share("wrong_name")(those)}
+            )  # fmt: skip
     return out
 
 
