@@ -45,7 +45,9 @@ def test_imports_nothing_of_the_diagnosis():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or "", *(a.name for a in node.names)] if isinstance(node, ast.ImportFrom) else []
-            assert not {"gap", "twins", "equations", "diagnosis", "study"} & {part for name in names for part in name.split(".")}, path.name
+            assert not {"gap", "twins", "equations", "diagnosis", "study"} & {
+                part for name in names for part in name.split(".")
+            }, path.name
 
 
 @pytest.mark.parametrize("rung", RUNGS)

@@ -22,13 +22,15 @@ from ..gap.decide import UNCALIBRATED, Calibration, Evidence
 from ..gap.run import diagnose_recordings, to_json
 from ..recording import replace_atomically
 from ..withheld.benches import make_cases, write_key_without
-from ..withheld.cases import Case, draw_case, is_disturbed, plain_twin, without_effect
+from ..withheld.cases import Case, draw_case, with_twin, without_effect
 from .curves import DETECTABLE, fit_gap, fit_right
 
 FIELDS = [f.name for f in fields(Evidence)]
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000
 PATHS = ("equations", "simulation")
+#: what a diagnosis may end with on data that it cannot digest
+FAILURES = (InputError, ArithmeticError, LookupError, ValueError, np.linalg.LinAlgError)
 
 
 def run_cases(
@@ -82,7 +84,10 @@ def run_cases(
                 write_key_without(keys[cases[0].name], keys[case.name])
         for path in missing:
             case, exclude = wanted[path]
-            verdict = diagnose_bench(benches[case.bench], actuator, noise, by, exclude)
+            try:
+                verdict = diagnose_bench(benches[case.bench], actuator, noise, by, exclude)
+            except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
+                verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
             text = to_json(verdict | {"bench": case.name})
             replace_atomically(path, lambda temporary, text=text: temporary.write_text(text))
         for bench in benches.values():
@@ -96,9 +101,7 @@ def run_cases(
 def companions(rung: str, seed: int, again: bool = False) -> list[Case]:
     """The case of a seed and what is diagnosed with it: its case of T3, or its plain twin."""
     case = draw_case(rung, seed)
-    if is_disturbed(case):
-        return [case, plain_twin(case)]
-    return [case, without_effect(case)] if again else [case]
+    return [case, without_effect(case)] if again else list(with_twin(case))
 
 
 def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:

@@ -51,4 +51,5 @@ def _line(seed: int, key: Mapping[str, Any], verdict: Mapping[str, Any]) -> str:
     truth += [f"{n} {f:.3g}" for n, f in case.get("controller", {}).items()]
     said = [*listed_names(verdict), *(f"~{d['form']} in {d['equation']}" for d in verdict.get("discovered", []))]
     twin = " plain twin" if case.get("plain") else ""
-    return f"{case['rung']} {seed}{twin}: {', '.join(truth) or '-'} | {verdict['verdict']}: {', '.join(said) or '-'}"
+    words = verdict.get("error") or ", ".join(said) or "-"
+    return f"{case['rung']} {seed}{twin}: {', '.join(truth) or '-'} | {verdict['verdict']}: {words}"

@@ -16,7 +16,7 @@ from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import time_axis
 from ..effects import EFFECTS
 from ..recording import Recording, replace_atomically, write_recording
-from .cases import Case, case_from_dict, draw_case, is_disturbed, plain_twin, without_effect
+from .cases import Case, case_from_dict, draw_case, is_disturbed, plain_twin, with_twin, without_effect
 from .detectability import LATTICE, Detector
 from .disturbances import FILTER, Unlisted, change, in_physics, terms_of, with_controller
 from .statistics import runs_of, simulate_plans
@@ -34,7 +34,7 @@ def make_cases(
 ) -> list[str]:
     """Make the benches and keys of a rung's seeds; what is there already is left alone.
 
-    A case with something unlisted or another controller comes with its plain twin. ``rivals`` adds the distance to the
+    A case of T7 or T9 comes with its plain twin. ``rivals`` adds the distance to the
     nearest effect of the same equations to each key, at twice the cost.
 
     Returns
@@ -48,7 +48,7 @@ def make_cases(
     names = []
     for seed in seeds:
         case = draw_case(rung, int(seed))
-        for one in (case, plain_twin(case)) if is_disturbed(case) else (case,):
+        for one in with_twin(case):
             names.append(one.name)
             key = Path(folder) / "keys" / f"{one.name}.json"
             if not key.exists():

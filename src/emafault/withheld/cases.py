@@ -1,7 +1,7 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
 A case is a pure function of its rung and seed; one of T3 is that of T1 with its effect left out of the library, on the
-same recordings. One with something unlisted (T7, T8) or another controller (T9) has a plain twin without it. Successive
+same recordings. One with something unlisted beside effects (T7) or another controller (T9) has a plain twin without it. Successive
 seeds go through the effects in order; rounds go through strata of the amplitude, each effect beginning elsewhere, so
 that a single round already holds weak and strong cases and any ``strata`` rounds are balanced.
 """
@@ -209,6 +209,11 @@ def plain_twin(case: Case) -> Case:
 def is_disturbed(case: Case) -> bool:
     """Whether a case holds something unlisted or another controller."""
     return bool(case.unlisted or case.controller)
+
+
+def with_twin(case: Case) -> tuple[Case, ...]:
+    """A case and, where it is compared with its plain twin, that one: T7 and T9."""
+    return (case, plain_twin(case)) if case.rung in ("T7", "T9") else (case,)
 
 
 def _different(turn: int, number: int, rng: np.random.Generator) -> list[str]:

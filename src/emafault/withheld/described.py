@@ -83,7 +83,7 @@ def change_without(row: Mapping, plain: Mapping) -> dict:
     return {
         "named_without": plain["all_named"],
         "another_without": plain["another"],
-        "inclusion_change": max(moved) if moved else None,
+        "inclusion_change": max(moved) if one and other and moved else None,
         "same": _of_the_plant(row) == _of_the_plant(plain),
     }
 

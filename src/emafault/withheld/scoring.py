@@ -321,6 +321,7 @@ METRICS = (
     Metric("ece_known", "expected calibration error, T0, T1, T2", _mixed, calibration_error, sense=-1),
     Metric("closed_faults_bound", "gap closed, fault vector, against the bound", _both, fault_closure("bound")),
     Metric("fault_bound", "fault-vector error over the best possible", _both, fault_ratio("bound"), sense=-1),
+    Metric("failed", "a diagnosis that ends in an error", lambda row: True, share("failed"), sense=-1),
     Metric("closed_signal_t4", "gap closed, signal, T4", _rung("T4"), closure("signal")),
     Metric("group_size", "mean size of a group, T1", _single("T1"), group_size, sense=-1),
 )
@@ -425,7 +426,7 @@ def _met(metric: Metric, value: float | None, bound) -> bool | None:
 
 def _said(row: dict) -> str:
     """What a row's answer counts as in the confusion matrix."""
-    if row["answer"] in ("unknown", "no_gap", "described"):
+    if row["answer"] in ("unknown", "no_gap", "described", "failed"):
         return str(row["answer"])
     if row["right"]:
         return str(row["truth"][0])
@@ -437,7 +438,7 @@ def _said(row: dict) -> str:
 
 def confusion(rows: Rows) -> dict:
     """Counts of what detectable single effects of T1 were called."""
-    labels = [*EFFECTS, "several", "wrong group", "described", "unknown", "no_gap"]
+    labels = [*EFFECTS, "several", "wrong group", "described", "unknown", "no_gap", "failed"]
     counts = np.zeros((len(EFFECTS), len(labels)), int)
     for row in rows:
         if row["rung"] == "T1" and row["detectable"]:

@@ -30,7 +30,7 @@ NAMED = 0.9  # inclusion probability from which a listed effect is named
 class Answer:
     """What a verdict says first: a named set, a group of alternatives, or a word that names no listed effect."""
 
-    kind: str  # named | group | described | unknown | no_gap
+    kind: str  # named | group | described | unknown | no_gap | failed
     effects: tuple[str, ...]
     probability: float
 
@@ -104,7 +104,7 @@ def first_answer(verdict: Mapping) -> Answer:
     """What the verdict says, with the probability that it gives to it."""
     merged = dict(merged_probabilities(verdict))
     kind = verdict["verdict"]
-    if kind in ("no_gap", "described"):
+    if kind in ("no_gap", "described", "failed"):
         return Answer(kind, (), merged.get((), 0.0))
     if kind == "unknown":
         return Answer("unknown", (UNKNOWN,), merged.get((UNKNOWN,), 0.0))
@@ -196,6 +196,7 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
         "controller": dict(case.get("controller") or {}),
         "verdict": verdict["verdict"],
         "answer": answer.kind,
+        "failed": answer.kind == "failed",
         "named": list(answer.effects),
         "inclusion": dict(verdict.get("inclusion") or {}),
         "right": right,
