@@ -1,9 +1,9 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
 A case is a pure function of its rung and seed; one of T3 is that of T1 with its effect left out of the library, on the
-same recordings. One with something unlisted beside effects (T7) or another controller (T9) has a plain twin without it. Successive
-seeds go through the effects in order; rounds go through strata of the amplitude, each effect beginning elsewhere, so
-that a single round already holds weak and strong cases and any ``strata`` rounds are balanced.
+same recordings. One with something unlisted beside effects (T7) or another controller (T9) has a plain twin without it.
+Successive seeds go through the effects in order; rounds go through strata of the amplitude, each effect beginning
+elsewhere, so that a single round already holds weak and strong cases and any ``strata`` rounds are balanced.
 """
 
 import hashlib

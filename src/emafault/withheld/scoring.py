@@ -37,8 +37,13 @@ class Metric:
 
 
 def share(field: str) -> Callable[[Rows], float | None]:
-    """Share of rows in which a field is true."""
-    return lambda rows: float(np.mean([bool(r[field]) for r in rows])) if rows else None
+    """Share of rows in which a field is true; what is compared with a plain twin, only those with one have."""
+
+    def of(rows: Rows) -> float | None:
+        values = [bool(r[field]) for r in rows if field in r]
+        return float(np.mean(values)) if values else None
+
+    return of
 
 
 def calibration_error(rows: Rows) -> float | None:
