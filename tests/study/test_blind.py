@@ -7,6 +7,8 @@ import pytest
 
 from emafault.gap.decide import UNCALIBRATED, Calibration, saturating
 from emafault.study.blind import calibrate
+from emafault.study.curves import DETECTABLE
+from emafault.withheld import verdicts
 
 START = Calibration.load(UNCALIBRATED)
 
@@ -47,6 +49,10 @@ def test_the_curves_tell_the_cases_apart_and_no_set_gets_more_than_its_kind_had_
     assert probability(found.gap, [0.0, saturating(3.0)]) < 0.2
     assert probability(found.gap, [saturating(200.0), saturating(60.0)]) > 0.95
     assert found.most == pytest.approx(39.0 / 42.0, abs=1e-3)
+
+
+def test_curves_and_scoreboard_call_the_same_cases_detectable():
+    assert DETECTABLE == verdicts.DETECTABLE == 25.0
 
 
 def test_evidence_counts_one_way_only(tmp_path):

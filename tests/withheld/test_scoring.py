@@ -119,6 +119,7 @@ def test_ladder_and_fault_vector():
     told = {"fault_vector": {"recording_0.nc": {"after": faults(0.03, 30.0)}}}
     verdict = verdict_of("explained", [(["cogging"], 1.0)], fault_vector=vectors)
     assert judge(key_of(COGGING), verdict, told)["fault_vector"]["oracle"] == pytest.approx(0.01)
+    assert judge(key_of(COGGING), verdict, {"fault_vector": {}})["fault_vector"]["oracle"] is None
     values = {m["id"]: m["value"] for m in score_rows([row])["metrics"]}
     assert values["closed_faults"] is None and values["fault_ratio"] is None
     assert values["closed_faults_bound"] == pytest.approx(0.16 / (0.16 - 6e-4))
