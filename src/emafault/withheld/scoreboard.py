@@ -181,7 +181,7 @@ def _rivals(lines: Sequence[Mapping]) -> str:
         + "</tr>"
         for u in lines
     )
-    return f"""<h2>Nearest rival (T1, T4, on a part of the cases)</h2><table>
+    return f"""<h2>Nearest rival, to first order (T1, T4, on a part of the cases)</h2><table>
 <tr><th>squared distance to it</th><th>cases</th><th>right</th><th>a wrong name</th></tr>{rows}</table>"""
 
 
