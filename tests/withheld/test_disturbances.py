@@ -16,6 +16,8 @@ from emafault.withheld.disturbances import (
     INSIDE,
     MEASURING,
     OUTSIDE,
+    SMALLEST,
+    USUAL_SMALLEST,
     Unlisted,
     change,
     draw_controller,
@@ -59,8 +61,9 @@ def test_a_third_is_outside_and_every_one_has_its_turn():
     drawn = [draw_unlisted(1, seed, np.random.default_rng(seed))[0] for seed in range(90)]
     assert sum(u.name in OUTSIDE for u in drawn) == 30
     assert {u.name for u in drawn} == set(INSIDE) | set(OUTSIDE)
-    sizes = np.log([u.size for u in drawn])
-    assert np.exp(sizes.min()) < 0.06 and np.exp(sizes.max()) > 0.7
+    shares = [np.log(u.size) / np.log(SMALLEST.get(u.name, USUAL_SMALLEST)) for u in drawn]
+    assert 0.0 < min(shares) < 0.1 and 0.9 < max(shares) < 1.0 and abs(np.mean(shares) - 0.5) < 0.1
+    assert set(SMALLEST) < set(DISTURBANCES)
 
 
 def test_what_the_key_tells_is_what_is_put_in():
