@@ -1,4 +1,4 @@
-"""Terms that no catalogue lists: each is what it says, and one that is a listed effect by another name does the same."""
+"""Terms that no catalogue lists: each is what it says, and one that is a listed effect by another name acts alike."""
 
 import numpy as np
 import pytest
