@@ -157,13 +157,15 @@ def _unlisted(lines: Sequence[Mapping]) -> str:
         return ""
     rows = "".join(
         f"<tr><td>{u['unlisted'].replace('_', ' ')}{'' if u['inside'] else ' (outside)'}</td>"
-        + "".join(f'<td class="n">{x}</td>' for x in (u["cases"], u["mixed"], *map(_part, _shares(u))))
+        + "".join(
+            f'<td class="n">{x}</td>' for x in (u["cases"], u["mixed"], *map(_part, _shares(u)), ", ".join(u["beside"]))
+        )
         + "</tr>"
         for u in lines
     )
     return f"""<h2>Beside what no catalogue lists (T7, T8)</h2><table><tr><th>unlisted</th><th>cases</th>
 <th>beside a detectable effect</th>
-<th>all listed named</th><th>another named</th><th>its equation</th><th>its form</th></tr>
+<th>all listed named</th><th>another named</th><th>its equation</th><th>its form</th><th>oftenest beside</th></tr>
 {rows}</table>"""
 
 
