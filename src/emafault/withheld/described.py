@@ -53,8 +53,8 @@ def _near(said: Mapping, true: Mapping) -> bool | None:
 def claims(verdict: Mapping, unlisted: Sequence[Mapping], truth: Sequence[str]) -> dict:
     """How many forms a verdict describes in the machine and its measuring chain, and how many of them are not there.
 
-    A remainder counts as a claim about its equation. Another form of a true effect is there, and so is a remainder in
-    an equation of one.
+    A remainder counts as a claim about its equation, and so does any form where the thing there has none. Another form
+    of a true effect is there, and so is a remainder in an equation of one.
     """
     places = {p for e in truth for p in EFFECTS[e].equations}
     described = [d for d in verdict.get("discovered") or () if d["equation"] != OWN_BUSINESS]
@@ -64,7 +64,9 @@ def claims(verdict: Mapping, unlisted: Sequence[Mapping], truth: Sequence[str]) 
             _same_equation(str(d["equation"]), u["equation"]) and d["form"] in (u["form"], "remainder")
             for u in unlisted
         )
-        own = d.get("another_form_of") in truth or (d["form"] == "remainder" and d["equation"] in places)
+        own = d.get("another_form_of") in truth or (
+            d["form"] == "remainder" and _same_equation(str(d["equation"]), sorted(places))
+        )
         false += not (there or own)
     return {"claims": len(described), "false_claims": false, "claimed": bool(described)}
 

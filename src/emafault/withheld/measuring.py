@@ -1,4 +1,8 @@
-"""Disturbances of the measuring chain: they change what is recorded and nothing else."""
+"""Disturbances of the measuring chain: they change what is recorded and nothing else.
+
+As with the catalogue's own effects of sensing, the electrical equation of the phase, which the channel stands in, is as
+right a place as the channel.
+"""
 
 import numpy as np
 
@@ -21,20 +25,20 @@ def lag_voltage(size: float, rng: np.random.Generator) -> Acting:
         v = signals["phase_voltage"]
         signals["phase_voltage"] = (1.0 - size) * v + size * np.concatenate([v[:1], v[:-1]])
 
-    return Acting(("sensor_voltage", "sensor_current"), {"lag": (size, "samples")}, change)
+    return Acting(("sensor_voltage", "sensor_current", "electrical"), {"lag": (size, "samples")}, change)
 
 
 @MEASURING.inside("spikes", "time", at_sight=True)
 def spikes_current(size: float, rng: np.random.Generator) -> Acting:
     """Single samples of one current are far off."""
-    j, rate, level = int(rng.integers(3)), 0.01 * size, 2.0
+    (j, phase), rate, level = letter(rng), 0.01 * size, 2.0
 
     def change(signals: Signals, own: np.random.Generator) -> None:
         current = signals["phase_current"]
         hit = own.choice(len(current), max(3, round(rate * len(current))), replace=False)
         current[hit, j] += own.normal(0.0, level, len(hit))
 
-    return Acting(("sensor_current",), {"share": (rate, "1")}, change)
+    return Acting(("sensor_current", f"electrical_{phase}"), {"share": (rate, "1")}, change)
 
 
 @MEASURING.inside("held", "time", at_sight=True)
@@ -47,7 +51,7 @@ def held_current(size: float, rng: np.random.Generator) -> Acting:
         for k in np.sort(own.choice(np.arange(1, len(current)), max(4, round(share * len(current))), replace=False)):
             current[k] = current[k - 1]
 
-    return Acting(("sensor_current",), {"share": (share, "1")}, change)
+    return Acting(("sensor_current", "electrical"), {"share": (share, "1")}, change)
 
 
 @MEASURING.inside("adc_step", "current", "time", at_sight=True)
@@ -59,13 +63,13 @@ def steps_current(size: float, rng: np.random.Generator) -> Acting:
         for name in _both(signals):
             signals[name] = step * np.round(signals[name] / step)
 
-    return Acting(("sensor_current",), {"step": (step, "A")}, change)
+    return Acting(("sensor_current", "electrical"), {"step": (step, "A")}, change)
 
 
 @MEASURING.inside("clipping", "current", "time", at_sight=True)
 def clipping_current(size: float, rng: np.random.Generator) -> Acting:
     """The current's mean is cut off above a level."""
-    j = int(rng.integers(3))
+    j, phase = letter(rng)
     share = 1.0 - 0.4 * size  # of the largest current of the recording
 
     def change(signals: Signals, _) -> None:
@@ -73,30 +77,32 @@ def clipping_current(size: float, rng: np.random.Generator) -> Acting:
         level = share * np.max(np.abs(current[:, j]))
         current[:, j] = np.clip(current[:, j], -level, level)
 
-    return Acting(("sensor_current",), {"share": (share, "1")}, change)
+    return Acting(("sensor_current", f"electrical_{phase}"), {"share": (share, "1")}, change)
 
 
 @MEASURING.inside("drift", "time")
 def drift_current(size: float, rng: np.random.Generator) -> Acting:
     """The offset of one current drifts with time."""
-    j, slope = int(rng.integers(3)), 0.2 * size
+    (j, phase), slope = letter(rng), 0.2 * size
 
     def change(signals: Signals, _) -> None:
         for name in _both(signals):
             signals[name][:, j] += slope * signals["time"]
 
-    return Acting(("sensor_current",), {"slope": (slope, "A/s")}, change)
+    return Acting(("sensor_current", f"electrical_{phase}"), {"slope": (slope, "A/s")}, change)
 
 
 @MEASURING.inside("drift", "time")
 def warm_up_voltage(size: float, rng: np.random.Generator) -> Acting:
     """The offset of one voltage goes to another value as its amplifier warms up."""
-    j, jump, constant = int(rng.integers(3)), 0.3 * size, float(rng.uniform(0.05, 0.3))
+    (j, phase), jump, constant = letter(rng), 0.3 * size, float(rng.uniform(0.05, 0.3))
 
     def change(signals: Signals, _) -> None:
         signals["phase_voltage"][:, j] += jump * (1.0 - np.exp(-signals["time"] / constant))
 
-    return Acting(("sensor_voltage",), {"jump": (jump, "V"), "time_constant": (constant, "s")}, change)
+    return Acting(
+        ("sensor_voltage", f"electrical_{phase}"), {"jump": (jump, "V"), "time_constant": (constant, "s")}, change
+    )
 
 
 @MEASURING.inside("crosstalk", "current", "time")
@@ -109,7 +115,7 @@ def crosstalk_current(size: float, rng: np.random.Generator) -> Acting:
         for name in _both(signals):
             signals[name][:, to] += gain * signals[name][:, source]
 
-    return Acting(("sensor_current",), {"gain": (gain, "1")}, change)
+    return Acting(("sensor_current", f"electrical_{'abc'[to]}"), {"gain": (gain, "1")}, change)
 
 
 @MEASURING.inside("frequency", "time")
@@ -122,7 +128,9 @@ def mains_current(size: float, rng: np.random.Generator) -> Acting:
         for name in _both(signals):
             signals[name] += wave[:, None]
 
-    return Acting(("sensor_current",), {"frequency": (frequency, "Hz"), "amplitude": (amplitude, "A")}, change)
+    return Acting(
+        ("sensor_current", "electrical"), {"frequency": (frequency, "Hz"), "amplitude": (amplitude, "A")}, change
+    )
 
 
 @MEASURING.inside("frequency", "time")
@@ -147,7 +155,7 @@ def bent_voltage(size: float, rng: np.random.Generator) -> Acting:
         v = signals["phase_voltage"]
         signals["phase_voltage"] = v * (1.0 - bend * (v / 24.0) ** 2)
 
-    return Acting(("sensor_voltage",), {"bend": (bend, "1")}, change)
+    return Acting(("sensor_voltage", "electrical"), {"bend": (bend, "1")}, change)
 
 
 @MEASURING.inside("order", "order", "rotor_angle")
@@ -165,14 +173,14 @@ def order_angle(size: float, rng: np.random.Generator) -> Acting:
 @MEASURING.outside("time")
 def wander_current(size: float, rng: np.random.Generator) -> Acting:
     """The offset of one current walks at random."""
-    j, level = int(rng.integers(3)), 0.1 * size
+    (j, phase), level = letter(rng), 0.1 * size
 
     def change(signals: Signals, own: np.random.Generator) -> None:
         walk = np.cumsum(own.standard_normal(len(signals["time"])))
         for name in _both(signals):
             signals[name][:, j] += level * walk / np.sqrt(len(walk))
 
-    return Acting(("sensor_current",), {"level": (level, "A")}, change)
+    return Acting(("sensor_current", f"electrical_{phase}"), {"level": (level, "A")}, change)
 
 
 @MEASURING.outside("time", "current")
@@ -190,7 +198,7 @@ def hum_voltage(size: float, rng: np.random.Generator) -> Acting:
 @MEASURING.outside("time", "current")
 def flicker_current(size: float, rng: np.random.Generator) -> Acting:
     """The gain of one current drops now and then, as with a loose contact in its channel."""
-    j, drop = int(rng.integers(3)), 0.1 * size
+    (j, phase), drop = letter(rng), 0.1 * size
 
     def change(signals: Signals, own: np.random.Generator) -> None:
         loose = np.zeros(len(signals["time"]))
@@ -199,4 +207,4 @@ def flicker_current(size: float, rng: np.random.Generator) -> Acting:
         for name in _both(signals):
             signals[name][:, j] *= 1.0 - drop * loose
 
-    return Acting(("sensor_current",), {"drop": (drop, "1")}, change)
+    return Acting(("sensor_current", f"electrical_{phase}"), {"drop": (drop, "1")}, change)
