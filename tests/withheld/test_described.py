@@ -99,6 +99,9 @@ def test_what_is_described_and_not_there_is_a_false_discovery():
     assert [r["false_claims"] for r in (nothing, own, control)] == [1, 0, 0]
     assert [r["claimed"] for r in (nothing, own, control)] == [True, True, False]
     assert metrics(nothing, own, control)["false_share"] == 0.5
+    beside = [described(), described(form="bump"), described(form="remainder"), described(equation="bus")]
+    within, without = mixed({}, ORDER, rung="T8"), mixed({}, Unlisted("seal", 0.5, 3), rung="T8")
+    assert [judge(key, said("described", discovered=beside))["false_claims"] for key in (within, without)] == [2, 1]
 
 
 def test_a_left_out_effect_that_is_described_is_right_and_a_listed_name_is_not():

@@ -60,10 +60,8 @@ def claims(verdict: Mapping, unlisted: Sequence[Mapping], truth: Sequence[str]) 
     described = [d for d in verdict.get("discovered") or () if d["equation"] != OWN_BUSINESS]
     false = 0
     for d in described:
-        there = any(
-            _same_equation(str(d["equation"]), u["equation"]) and d["form"] in (u["form"], "remainder")
-            for u in unlisted
-        )
+        near = [u for u in unlisted if _same_equation(str(d["equation"]), u["equation"])]
+        there = any(u["form"] is None or d["form"] in (u["form"], "remainder") for u in near)
         own = d.get("another_form_of") in truth or (
             d["form"] == "remainder" and _same_equation(str(d["equation"]), sorted(places))
         )
