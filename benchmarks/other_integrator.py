@@ -1,6 +1,7 @@
 """Diagnoses of benches that a fixed step simulated: is another integrator taken for an effect, or an effect missed?
 
     python benchmarks/other_integrator.py [--step 1e-6] [--sampled] [--rung T1] [--first 1060000] [--cases 31]
+        [--by simulation]
 
 Prints each verdict that is not right and how many of the detectable cases are; the seeds are those of development.
 With ``--sampled`` comparator and commutation act at the steps only.

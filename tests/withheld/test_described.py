@@ -62,6 +62,9 @@ def test_listed_effects_beside_something_unlisted():
     assert row["all_named"] and not row["another"]
     far = judge(mixed(LOAD, ORDER), said("group", {}, groups=[["load_constant", "stribeck"]]))
     assert not far["all_named"] and far["beside"] == ["stribeck"]
+    half = said("partly", {"load_constant": 0.5}, groups=[["friction_asymmetry", "load_constant"]])
+    half = judge(mixed({**COGGING, **LOAD}, ORDER), half)  # a group is near whether or not the other effect is found
+    assert not half["all_named"] and not half["another"]
     lost = judge(mixed(COGGING, ORDER), said("unknown", {"cogging": 0.6}))
     twins = [judge(mixed(COGGING, plain=True), said("explained", {"cogging": 0.99})) for _ in range(1)]
     found = metrics(right, another, lost, *twins)

@@ -173,7 +173,7 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
     best, confidence = merged[0] if merged else ((), 0.0)
     detectability = key["detectability"] or {"nominal": 0.0, "members": {}}
     detectable = bool(truth) and min(detectability["members"].values()) >= DETECTABLE
-    rivals = _rivals(key, answer, best, detectable)
+    rivals = _rivals(key, verdict, answer, best, detectable)
     right = is_right(answer, key, rivals)
     unknown = sum(float(e["probability"]) for e in verdict["which"] if UNKNOWN in e["effects"])
     if answer.kind == "described":
@@ -204,7 +204,7 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
         "wrong_name": answer.kind in ("named", "group") and not right,
         "rivals": rivals,
         "confidence": min(1.0, confidence),
-        "confident_right": _hypothesis_right(best, truth, left_out, answer.kind, rivals),
+        "confident_right": bool(merged) and _hypothesis_right(best, truth, left_out, answer.kind, rivals),
         "unknown": min(1.0, unknown),
         "equation_right": _equation_right(verdict, truth)
         if answer.kind in ("unknown", "described") and truth
@@ -219,12 +219,14 @@ def judge(key: Mapping, verdict: Mapping, oracle: Mapping | None = None) -> dict
     return row
 
 
-def _rivals(key: Mapping, answer: Answer, best: tuple[str, ...], detectable: bool) -> dict[str, float]:
+def _rivals(
+    key: Mapping, verdict: Mapping, answer: Answer, best: tuple[str, ...], detectable: bool
+) -> dict[str, float]:
     """Squared distances from the truth of what was named beside it or in its place, where the judgement asks."""
     truth = tuple(key["case"]["effects"])
     if not truth or answer.kind not in ("named", "group"):
         return {}
-    asked: set[str] = set()
+    asked = {m for g in listed_groups(verdict) if by_inclusion(verdict) and set(g) & set(truth) for m in g}
     if answer.kind == "group" and set(truth) <= set(answer.effects):
         asked |= set(answer.effects)
     if best[:1] == ("group",) and set(truth) <= set(best):
