@@ -8,8 +8,9 @@ import pytest
 from emafault.errors import InputError
 from emafault.withheld import verdicts
 from emafault.withheld.cases import draw_case
+from emafault.withheld.metrics import area_under_curve, calibration_error
 from emafault.withheld.scoreboard import write_scoreboard
-from emafault.withheld.scoring import area_under_curve, calibration_error, score, score_rows
+from emafault.withheld.scoring import score, score_rows
 from emafault.withheld.verdicts import Answer, first_answer, is_right, judge, names_truth
 
 
