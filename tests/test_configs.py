@@ -170,3 +170,18 @@ def test_only_the_papers_recipe_drops_the_start_and_the_bound_drops_what_no_meth
     kept = {name: entry["discard"] for name, entry in paper["reconstruction"].items()}
     assert kept == {"paper": 0.05, "weighted": 0.1, "weighted_floating": 0.0}
     assert config.bound_spec(paper)["discard"] == 0.0
+
+
+def test_draws_of_blind_cases_share_none(monkeypatch):
+    config.check_draws()
+    read = config._withheld_draw
+    overlapping = {"brief": {"cases": {"T1": 5}, "first_seed": 4890}}
+    monkeypatch.setattr(config, "_withheld_draw", lambda draw: read(draw) | overlapping.get(draw, {}))
+    with pytest.raises(InputError, match="brief and standard share seeds 4890 to 4894 of T1"):
+        config.plan()
+
+
+def test_a_draw_that_is_the_same_as_another_has_its_cases():
+    one, other = (config.withheld_spec(draw, "T7", 1) for draw in ("standard", "standard_by_simulation"))
+    assert one | {"by": "simulation"} == other
+    assert len(one["seeds"]["told"]) == 0 and len(config.withheld_spec("standard", "T1", 0)["seeds"]["told"]) == 5

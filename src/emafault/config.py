@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -331,7 +332,34 @@ def withheld_draws() -> list[str]:
 
 
 def _withheld_draw(draw: str) -> dict[str, Any]:
-    return OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore[return-value]
+    """A draw of conf/withheld; one that is the ``same_as`` another has its cases, and differs in what it says itself.
+
+    Raises
+    ------
+    InputError : a path of the diagnosis that there is not
+    """
+    read: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore
+    if "same_as" in read:
+        read = _withheld_draw(read["same_as"]) | read
+    if read["by"] not in ("equations", "simulation"):
+        raise InputError(f"withheld.{draw}.by: got '{read['by']}', accepted are equations and simulation")
+    return read
+
+
+def check_draws() -> None:
+    """Refuse draws of blind cases that share a case; one that is the ``same_as`` another is no draw of its own.
+
+    Raises
+    ------
+    InputError : naming two draws, the rung and the seeds that they share
+    """
+    draws = {draw: read for draw in withheld_draws() if "same_as" not in (read := _withheld_draw(draw))}
+    for (one, first), (other, second) in combinations(draws.items(), 2):
+        for rung in first["cases"].keys() & second["cases"].keys() - {"T3"}:
+            low = max(_of_rung(read["first_seed"], rung) for read in (first, second))
+            high = min(_of_rung(read["first_seed"], rung) + read["cases"][rung] for read in (first, second))
+            if low < high:
+                raise InputError(f"withheld: the draws {one} and {other} share seeds {low} to {high - 1} of {rung}")
 
 
 def _of_rung(value: Any, rung: str) -> int:
@@ -347,23 +375,26 @@ def withheld_jobs(draw: str) -> list[tuple[str, int]]:
 
 
 def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
-    """What one job of blind cases reads: its seeds, the actuator and the sensors.
+    """What one job of blind cases reads: its seeds, the path of the diagnosis, the actuator and the sensors.
 
-    ``again`` are those of T1 that T3 diagnoses too: whole rounds of the effects, spread over the draw.
+    ``again`` are those of T1 that T3 diagnoses too: whole rounds of the effects, spread over the draw. ``told`` are
+    diagnosed a second time by a library of the truth alone, ``rivals`` have the distance to the nearest one computed.
     """
     read = _withheld_draw(draw)
     origin, size = _of_rung(read["first_seed"], rung), _of_rung(read["batch"], rung)
     first = origin + batch * size
     last = min(first + size, origin + read["cases"][rung])
     config = compose()
-    again = []
+    seeds: dict[str, Any] = {"rung": rung, "first": first, "last": last, "again": []}
     if rung == "T1":
         effects, cases = len(EFFECTS), read["cases"]
         apart = max(1, cases["T1"] // max(cases["T3"], 1))  # rounds from one that T3 takes to the next
         taken = [origin + effects * apart * (n // effects) + n % effects for n in range(cases["T3"])]
-        again = [seed for seed in taken if first <= seed < last]
-    seeds = {"rung": rung, "first": first, "last": last, "again": again}
-    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
+        seeds["again"] = [seed for seed in taken if first <= seed < last]
+    for name in ("told", "rivals"):
+        every = read.get(name, {}).get(rung, 0)
+        seeds[name] = [seed for seed in range(first, last) if every and (seed - origin) % every == 0]
+    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds, "by": read["by"]})
 
 
 @dataclass(frozen=True)
@@ -409,8 +440,9 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
 
     Raises
     ------
-    InputError : as ``compose``; also one dataset name composed in two ways
+    InputError : as ``compose``; also one dataset name composed in two ways, or draws of blind cases that share one
     """
+    check_draws()
     texts = split_overrides(overrides)
     top = compose(experiment, texts)
     if top["variants"]:

@@ -17,9 +17,10 @@ from emafault.config import reference_actuator, withheld_jobs, withheld_spec
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.recording import read_recording
-from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth
-from emafault.withheld.cases import RUNGS, STRATA, case_from_dict, draw_case, stratum_of
+from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth, write_bench
+from emafault.withheld.cases import RUNGS, STRATA, case_from_dict, draw_case, plain_twin, stratum_of
 from emafault.withheld.detectability import Detector
+from emafault.withheld.disturbances import DISTURBANCES
 
 NOISE = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
 IDS = list(EFFECTS)
@@ -45,10 +46,12 @@ def test_imports_nothing_of_the_diagnosis():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or "", *(a.name for a in node.names)] if isinstance(node, ast.ImportFrom) else []
-            assert not {"gap", "twins"} & {part for name in names for part in name.split(".")}, path.name
+            assert not {"gap", "twins", "equations", "diagnosis", "study"} & {
+                part for name in names for part in name.split(".")
+            }, path.name
 
 
-@pytest.mark.parametrize("rung", ["T0", "T1", "T2", "T3", "T4"])
+@pytest.mark.parametrize("rung", RUNGS)
 def test_a_case_is_its_seed(rung):
     case = draw_case(rung, 137)
     assert case == draw_case(rung, 137)
@@ -118,7 +121,7 @@ def test_health_means_what_the_format_says():
 
 def test_unknown_rung():
     with pytest.raises(InputError, match="rung"):
-        draw_case("T9", 0)
+        draw_case("T5", 0)
 
 
 def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
@@ -137,6 +140,35 @@ def test_benches_are_readable_and_the_key_is_elsewhere(tmp_path):
     make_cases("T4", [STRONG_STRIBECK], tmp_path / "two", actuator, NOISE)
     again = read_recording(tmp_path / "two" / "benches" / name / "recording_0.nc")
     np.testing.assert_array_equal(again.phase_voltage, recordings[0].phase_voltage)
+
+
+@pytest.mark.parametrize(("rung", "seed"), [("T1", 3), ("T7", 5)])
+def test_neither_name_nor_attributes_tell_the_case(tmp_path, rung, seed):
+    case = draw_case(rung, seed)
+    for one in (case, plain_twin(case)):
+        short = replace(one, recordings=one.recordings[:1])
+        write_bench(short, tmp_path / one.bench, reference_actuator(), NOISE)
+        said = read_recording(tmp_path / one.bench / "recording_0.nc").attributes
+        assert said["unit"] == "unknown"
+        assert set(said) == {"title", "command", "health", "unit", "Conventions"}
+        text = f"{one.name} {one.bench} {' '.join(said.values())}".lower()
+        assert not [word for word in (*EFFECTS, *DISTURBANCES, rung.lower(), "plain") if word in text]
+
+
+def test_names_of_cases_are_their_own():
+    cases = [draw_case(rung, seed) for rung in RUNGS for seed in range(40)]
+    cases += [plain_twin(c) for c in cases if c.rung in ("T7", "T9")]
+    assert len({c.name for c in cases}) == len(cases)
+    assert draw_case("T3", 7).bench == draw_case("T1", 7).bench == draw_case("T1", 7).name
+
+
+def test_distances_are_marginal_over_the_nuisances():
+    """What a unit's tolerance or a fault moves by one standard deviation of its prior is at most one apart."""
+    found = detector("cogging", 10)
+    moved = found.jacobian
+    assert np.max(np.sum(moved**2, axis=0)) > 100.0
+    for column in moved.T:
+        assert -1e-9 <= found.squared(column) <= 1.0 + 1e-9
 
 
 def detector(effect: str, stratum: int) -> Detector:

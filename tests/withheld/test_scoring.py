@@ -8,8 +8,9 @@ import pytest
 from emafault.errors import InputError
 from emafault.withheld import verdicts
 from emafault.withheld.cases import draw_case
+from emafault.withheld.metrics import area_under_curve, calibration_error
 from emafault.withheld.scoreboard import write_scoreboard
-from emafault.withheld.scoring import area_under_curve, calibration_error, score, score_rows
+from emafault.withheld.scoring import score, score_rows
 from emafault.withheld.verdicts import Answer, first_answer, is_right, judge, names_truth
 
 
@@ -114,14 +115,21 @@ def test_ladder_and_fault_vector():
     assert row["features"] is None
     assert row["fault_vector"]["before"] == pytest.approx(0.4**2)
     assert row["fault_vector"]["after"] == pytest.approx(0.0)
-    assert row["fault_vector"]["oracle"] == pytest.approx(6 * 0.01**2)
+    assert row["fault_vector"]["bound"] == pytest.approx(6 * 0.01**2)
+    assert row["fault_vector"]["oracle"] is None  # no told diagnosis was run
     told = {"fault_vector": {"recording_0.nc": {"after": faults(0.03, 30.0)}}}
     verdict = verdict_of("explained", [(["cogging"], 1.0)], fault_vector=vectors)
     assert judge(key_of(COGGING), verdict, told)["fault_vector"]["oracle"] == pytest.approx(0.01)
+    assert judge(key_of(COGGING), verdict, {"fault_vector": {}})["fault_vector"]["oracle"] is None
+    values = {m["id"]: m["value"] for m in score_rows([row])["metrics"]}
+    assert values["closed_faults"] is None and values["fault_ratio"] is None
+    assert values["closed_faults_bound"] == pytest.approx(0.16 / (0.16 - 6e-4))
+    row = judge(key_of(COGGING), verdict, told)
+    row["signal"] = {"recalibrated": 9.0, "placebo": 2.9**2, "after": 1.1**2, "floor": 1.0}
     values = {m["id"]: m["value"] for m in score_rows([row])["metrics"]}
     assert values["closed_signal"] == pytest.approx((9.0 - 1.21) / 8.0)
     assert values["placebo"] == pytest.approx((9.0 - 2.9**2) / 8.0)
-    assert values["closed_faults"] == pytest.approx(0.16 / (0.16 - 6e-4))
+    assert values["closed_faults"] == pytest.approx(0.16 / (0.16 - 0.01))
     assert values["fault_ratio"] == pytest.approx(0.0)
 
 
@@ -133,6 +141,42 @@ def test_curve_and_calibration():
     assert area_under_curve(rows[:2]) is None
     rows = [{"confidence": 0.95, "confident_right": c} for c in (True,) * 9 + (False,)]
     assert calibration_error(rows) == pytest.approx(0.05)
+
+
+def test_errors_of_probabilities_on_both_sides_do_not_cancel():
+    rows = [{"confidence": 0.75, "confident_right": c} for c in (True,) * 9 + (False,)]
+    rows += [{"confidence": 0.95, "confident_right": c} for c in (True,) * 8 + (False,) * 2]
+    assert calibration_error(rows) == pytest.approx(0.15)
+    assert calibration_error(rows[:10]) == pytest.approx(0.15)  # too modest is an error like too sure
+
+
+def test_a_group_is_as_right_for_its_probability_as_it_is_for_its_answer(monkeypatch):
+    sets = [([e], 0.48, {"group": 0}) for e in ("load_constant", "friction_asymmetry")]
+    verdict = verdict_of("group", sets, [["friction_asymmetry", "load_constant"]])
+    for distance, right in ((5.9, True), (6.1, False)):
+        monkeypatch.setattr(verdicts, "rival_distances", lambda key, rivals, d=distance: dict.fromkeys(rivals, d))
+        row = judge(key_of(LOAD), verdict)
+        assert row["right"] is right and row["confident_right"] is right and row["confidence"] == pytest.approx(0.96)
+
+
+@pytest.mark.parametrize(("distance", "detectable"), [(24.0, False), (26.0, True), (99.0, True)])
+def test_detectable_is_a_squared_distance_of_25(distance, detectable):
+    row = judge(key_of(COGGING, distance=distance), verdict_of("no_gap", [([], 1.0)]))
+    assert row["detectable"] is detectable
+
+
+def test_cases_of_one_bench_are_drawn_again_together():
+    """T3 diagnoses benches of T1 again; as independent cases their shares would look surer than they are."""
+    named = verdict_of("explained", [(["cogging"], 1.0)])
+    rows = []
+    for seed in range(12):
+        key = key_of(COGGING)
+        key["case"]["seed"] = seed
+        rows.append(judge(key, verdict_of("no_gap", [([], 1.0)]) if seed % 2 else named))
+    once = {m["id"]: m for m in score_rows(rows)["metrics"]}["right_t1"]
+    doubled = {m["id"]: m for m in score_rows([r for r in rows for _ in range(8)])["metrics"]}["right_t1"]
+    assert doubled["high"] - doubled["low"] == pytest.approx(once["high"] - once["low"], abs=0.1)
+    assert rows[0]["bench"] == judge(key_of(COGGING, "T3", left_out=["cogging"]), named)["bench"]
 
 
 def test_score_of_a_folder(tmp_path, monkeypatch):

@@ -67,6 +67,12 @@ rule withheld:
         f"{WITHHELD}/standard/scoreboard.html",
 
 
+rule withheld_by_simulation:
+    """The standard scoreboard's benches, diagnosed against simulated recordings."""
+    input:
+        f"{WITHHELD}/standard_by_simulation/scoreboard.html",
+
+
 rule withheld_full:
     """The large scoreboard; resumes."""
     input:
@@ -80,7 +86,7 @@ rule withheld_brief:
 
 
 rule withheld_smallest:
-    """Three cases, for the tests."""
+    """A handful of cases, for the tests."""
     input:
         f"{WITHHELD}/smallest/scoreboard.html",
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..errors import InputError
 from .compiled import compiled
+from .unlisted import acting, no_terms, remembered
 
 #: effects that have an alternative form; the position in this tuple is the flag's index in the kernel
 FORMS = tuple(sorted(EFFECTS))
@@ -42,6 +43,9 @@ def simulate_fixed_step(
     step: float = 1e-6,
     forms: Collection[str] = (),
     sampled: bool = False,
+    terms: np.ndarray | None = None,
+    table: np.ndarray | None = None,
+    filter_time: float = 0.0,
 ) -> dict[str, np.ndarray]:
     """Simulate runs on a fixed step and return the clean recorded signals.
 
@@ -54,6 +58,9 @@ def simulate_fixed_step(
         belongs to the sensors (see ``quantise_by_truncation``).
     sampled : comparator and commutation act at the end of the step in which they are due, as in a plain simulator,
         and not within it
+    terms : (term, number) causes that no catalogue lists, see ``unlisted.term``
+    table : (entry,) what a term of shape ``table`` follows, an entry every ``unlisted.TABLE_STEP``
+    filter_time : time constant (s) of a first-order filter on the current reference, at the control ticks
 
     Returns
     -------
@@ -73,16 +80,19 @@ def simulate_fixed_step(
         raise InputError(f"step: got {step} s, accepted is above 0 and up to the interval {interval} s")
     samples = round(duration / interval)
     command = np.asarray(command, float)
+    extra = no_terms() if terms is None else np.ascontiguousarray(terms, float)
+    wander = np.zeros(2) if table is None else np.ascontiguousarray(table, float)
     phased = {name: np.zeros((len(runs), samples, 3)) for name in SIGNALS}
     scalar = {name: np.zeros((len(runs), samples)) for name in SCALARS}
     for r, record in enumerate(runs):
         ticks = command if command.ndim == 1 else command[r]
         if (len(ticks) - 1) * record["control_period"] < samples * interval - 1e-9:
             raise InputError(f"command: covers {len(ticks) - 1} control periods, shorter than {duration} s")
-        table = _back_emf_table(record) if flags[F_SHAPE] else np.zeros(TABLE)
+        emf = _back_emf_table(record) if flags[F_SHAPE] else np.zeros(TABLE)
         out_phased = np.zeros((3, samples, 3))
         out_scalar = np.zeros((5, samples))
-        _run(record, ticks, samples, interval, step, flags, sampled, table, out_phased, out_scalar)
+        how = interval, step, flags, sampled, emf, extra, wander, filter_time
+        _run(record, ticks, samples, *how, out_phased, out_scalar)
         for j, name in enumerate(SIGNALS):
             phased[name][r] = out_phased[j]
         for j, name in enumerate(SCALARS):
@@ -195,7 +205,7 @@ def _sense(i, gain, offset, curved):
 
 
 @compiled
-def _run(record, command, samples, interval, step, forms, sampled, table, phased, scalar):
+def _run(record, command, samples, interval, step, forms, sampled, table, terms, wander, filter_time, phased, scalar):
     p, J0, ratio = record.pole_pairs, record.inertia, record.gear_ratio
     Tc, Vf, h = record.control_period, record.diode_voltage, record.hysteresis
     ambient = record.dT
@@ -257,6 +267,10 @@ def _run(record, command, samples, interval, step, forms, sampled, table, phased
     forward = True
     queue_time, queue_value = np.zeros(64), np.zeros(64)
     queued = served = 0
+    memory, added = np.zeros(len(terms)), np.zeros(7)
+    filtered, reference_share = 0.0, 1.0
+    if filter_time > 0.0:
+        reference_share -= np.exp(-Tc / filter_time)
 
     # sums over the recording interval
     sum_v, sum_i = np.zeros(3), np.zeros(3)
@@ -272,6 +286,9 @@ def _run(record, command, samples, interval, step, forms, sampled, table, phased
             if abs(record.speed_gain * error + record.speed_integral_gain * trial) <= record.current_limit:
                 integral = trial
             value = record.speed_gain * error + record.speed_integral_gain * integral
+            if reference_share < 1.0:
+                filtered += reference_share * (value - filtered)
+                value = filtered
             delay = record.control_delay_delay
             if forms[F_DELAY]:
                 u = np.sin(12.9898 * (tick + 1)) * 43758.5453
@@ -299,6 +316,11 @@ def _run(record, command, samples, interval, step, forms, sampled, table, phased
             if w == 0.0:
                 w_mid = 0.0
             middle_angle = theta + 0.5 * dt * w_mid
+            for m in range(len(terms)):
+                if m == 0:
+                    added[:] = 0.0
+                added[int(terms[m, 0])] += acting(terms[m], now, middle_angle, w_mid, memory[m], wander)
+                memory[m] = remembered(terms[m], w_mid, memory[m], dt)
             factor = 1.0
             if record.eccentricity_law == 1:
                 factor += record.eccentricity[0] * np.cos(theta) + record.eccentricity[1] * np.sin(theta)
@@ -316,8 +338,9 @@ def _run(record, command, samples, interval, step, forms, sampled, table, phased
                     if forms[F_DYNAMIC]:
                         swing = swing / (1.0 - swing) + 0.2 * record.dynamic_eccentricity_d * np.cos(2.0 * y)
                     k[j] *= 1.0 + swing
+                k[j] *= 1.0 + added[1 + j]
                 e[j] = k[j] * w_mid
-                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j]
+                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j] + added[4 + j]
             lag = i_bus_2 if forms[F_BUS_R] else i_bus
             bus = record.bus_voltage_Vdc - record.bus_resistance_R * lag
             if forms[F_BUS_V]:
@@ -459,7 +482,7 @@ def _run(record, command, samples, interval, step, forms, sampled, table, phased
             drag = B * record.viscous_friction_scale * w
             if forms[F_VISCOUS]:
                 drag = B * w + (record.viscous_friction_scale - 1.0) * B * np.sign(w) * abs(w) ** 0.8 * 100.0**0.2
-            active = torque - drag
+            active = torque - drag + added[0]
             if record.cogging_a != 0.0:
                 active -= record.cogging_a * np.sin(slots * theta)
             if forms[F_COGGING]:

@@ -1,7 +1,7 @@
 """Diagnoses of blind cases, for the withheld check and for calibrating the probabilities.
 
-The cases' generator and the diagnoser do not know each other; they meet here. A diagnosis sees a bench's folder and, on
-the rung that leaves an effect out, which one the library lacks.
+The cases' generator and the diagnosers do not know each other; they meet here. A diagnosis sees a bench's folder and,
+on the rung that leaves an effect out, which one the library lacks; one that is told has a library of the truth alone.
 """
 
 import json
@@ -14,17 +14,23 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..gap.bench import read_bench
+from ..effects import EFFECTS
+from ..equations.diagnose import diagnose
+from ..errors import InputError
+from ..gap.bench import read_bench, split_bench
 from ..gap.decide import UNCALIBRATED, Calibration, Evidence
-from ..gap.run import diagnose_recordings
+from ..gap.run import diagnose_recordings, to_json
 from ..recording import replace_atomically
 from ..withheld.benches import make_cases, write_key_without
-from ..withheld.cases import draw_case, without_effect
+from ..withheld.cases import Case, draw_case, with_twin, without_effect
 from .curves import DETECTABLE, fit_gap, fit_right
 
 FIELDS = [f.name for f in fields(Evidence)]
 #: cases of the development draw stand above this seed, those of the scoreboard below
 DEVELOPMENT = 1_000_000
+PATHS = ("equations", "simulation")
+#: what a diagnosis may end with on data that it cannot digest
+FAILURES = (InputError, ArithmeticError, LookupError, ValueError, np.linalg.LinAlgError)
 
 
 def run_cases(
@@ -33,14 +39,22 @@ def run_cases(
     folder: Path,
     actuator: ActuatorParameters,
     noise: SensorNoise,
-    calibration: Calibration,
+    by: str = "equations",
     keep_benches: bool = False,
     again: Collection[int] = (),
+    told: Collection[int] = (),
+    rivals: Collection[int] = (),
 ) -> list[str]:
     """Make, diagnose and keep the verdicts of a rung's seeds; what is there already is left alone.
 
-    Of the seeds of T1 ``again`` are also diagnosed with the effect left out of the library: T3, on the same bench.
     ``FOLDER/keys`` and ``FOLDER/diagnoses/NAME/diagnosis.json`` stay; the recordings go once they are diagnosed.
+
+    Parameters
+    ----------
+    by : the path of the diagnosis, one of ``PATHS``
+    again : seeds of T1 that are also diagnosed with the effect left out of the library: T3, on the same bench
+    told : seeds that are also diagnosed with a library of the true effects alone: ``FOLDER/oracles/NAME``
+    rivals : seeds whose keys hold the distance to the nearest rival
 
     Returns
     -------
@@ -48,29 +62,46 @@ def run_cases(
     """
     names = []
     for seed in seeds:
-        case = draw_case(rung, seed)
-        cases = [case, without_effect(case)] if seed in again else [case]
+        cases = companions(rung, seed, seed in again)
         names += [c.name for c in cases]
-        verdicts = [folder / "diagnoses" / c.name / "diagnosis.json" for c in cases]
-        keys = [folder / "keys" / f"{c.name}.json" for c in cases]
-        missing = [n for n in range(len(cases)) if not (verdicts[n].exists() and keys[n].exists())]
-        if not missing:
+        wanted: dict[Path, tuple[Case, Sequence[str]]] = {}
+        for case in cases:
+            wanted[folder / "diagnoses" / case.name / "diagnosis.json"] = case, case.left_out
+        if seed in told and cases[0].effects:
+            others = tuple(e for e in EFFECTS if e not in cases[0].effects)
+            wanted[folder / "oracles" / cases[0].name / "diagnosis.json"] = cases[0], others
+        keys = {c.name: folder / "keys" / f"{c.name}.json" for c in cases}
+        missing = [path for path in wanted if not path.exists()]
+        if not missing and all(key.exists() for key in keys.values()):
             continue
-        bench = folder / "benches" / case.name
-        if not bench.exists():
-            keys[0].unlink(missing_ok=True)
-        make_cases(rung, [seed], folder, actuator, noise)
-        for n in missing:
-            if n > 0:
-                write_key_without(keys[0], keys[n])
-            verdict = diagnose_bench(bench, actuator, noise, calibration, cases[n].left_out)
-            text = json.dumps(verdict | {"bench": cases[n].name}, indent=1)
-            replace_atomically(verdicts[n], lambda temporary, text=text: temporary.write_text(text))
-        if not keep_benches:
-            for file in bench.glob("*.nc"):
-                file.unlink()
-            bench.rmdir()
+        benches = {c.bench: folder / "benches" / c.bench for c in cases}
+        for case in cases:
+            if not benches[case.bench].exists():
+                keys[case.name].unlink(missing_ok=True)
+        make_cases(rung, [seed], folder, actuator, noise, seed in rivals)
+        for case in cases:
+            if case.left_out:
+                write_key_without(keys[cases[0].name], keys[case.name])
+        for path in missing:
+            case, exclude = wanted[path]
+            try:
+                verdict = diagnose_bench(benches[case.bench], actuator, noise, by, exclude)
+            except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
+                verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
+            text = to_json(verdict | {"bench": case.name})
+            replace_atomically(path, lambda temporary, text=text: temporary.write_text(text))
+        for bench in benches.values():
+            if not keep_benches:
+                for file in bench.glob("*.nc"):
+                    file.unlink()
+                bench.rmdir()
     return names
+
+
+def companions(rung: str, seed: int, again: bool = False) -> list[Case]:
+    """The case of a seed and what is diagnosed with it: its case of T3, or its plain twin."""
+    case = draw_case(rung, seed)
+    return [case, without_effect(case)] if again else list(with_twin(case))
 
 
 def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
@@ -82,7 +113,8 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
     folder = output.parent / f"cases_{code[:8]}"
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
     span = range(seeds["first"], seeds["last"])
-    names = run_cases(seeds["rung"], span, folder, actuator, noise, Calibration.load(), again=seeds["again"])
+    beside = {name: seeds[name] for name in ("again", "told", "rivals")}
+    names = run_cases(seeds["rung"], span, folder, actuator, noise, spec["by"], **beside)
     text = json.dumps({"folder": folder.name, "cases": names})
     replace_atomically(output, lambda temporary: temporary.write_text(text))
 
@@ -98,13 +130,23 @@ def diagnose_bench(
     bench: Path,
     actuator: ActuatorParameters,
     noise: SensorNoise,
-    calibration: Calibration,
+    by: str = "equations",
     exclude: Sequence[str] = (),
-    threads: int = 1,
 ) -> dict:
-    """The verdict on a bench by the reference actuator's twin, without report or next experiment."""
+    """The verdict on a bench by one of ``PATHS``, without report or next experiment.
+
+    Raises
+    ------
+    InputError : an unknown path, or recordings that cannot be used
+    """
     brought = read_bench(bench, actuator)
-    return diagnose_recordings(brought, actuator, noise, exclude, calibration, whole=False, threads=threads).verdict
+    if by == "equations":
+        recordings = brought.recordings
+        return diagnose(brought.name, recordings, split_bench(recordings), actuator, noise, exclude).verdict
+    if by == "simulation":
+        calibration = Calibration.load()
+        return diagnose_recordings(brought, actuator, noise, exclude, calibration, whole=False, threads=1).verdict
+    raise InputError(f"by: got '{by}', accepted are {', '.join(PATHS)}")
 
 
 def calibrate(folder: Path, start: Calibration) -> Calibration:

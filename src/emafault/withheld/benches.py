@@ -5,7 +5,7 @@
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,9 @@ from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import time_axis
 from ..effects import EFFECTS
 from ..recording import Recording, replace_atomically, write_recording
-from .cases import Case, case_from_dict, draw_case, without_effect
-from .detectability import Detector
+from .cases import Case, case_from_dict, draw_case, is_disturbed, plain_twin, with_twin, without_effect
+from .detectability import LATTICE, Detector
+from .disturbances import FILTER, Unlisted, change, in_physics, terms_of, with_controller
 from .statistics import runs_of, simulate_plans
 
 STEP = 2e-6  # s, of the other integrator
@@ -33,44 +34,49 @@ def make_cases(
 ) -> list[str]:
     """Make the benches and keys of a rung's seeds; what is there already is left alone.
 
-    ``rivals`` adds the distance to the nearest effect of the same equations to each key, at twice the cost.
+    A case of T7 or T9 comes with its plain twin. ``rivals`` adds the distance to the
+    nearest effect of the same equations to each key, at twice the cost.
 
     Returns
     -------
-    names of the cases
+    names of the cases, each followed by that of its plain twin
 
     Raises
     ------
     InputError : an unknown rung, or a folder that cannot be written
     """
-    folder = Path(folder)
     names = []
     for seed in seeds:
         case = draw_case(rung, int(seed))
-        names.append(case.name)
-        key = folder / "keys" / f"{case.name}.json"
-        if key.exists():
-            continue
-        signals = write_bench(case, folder / "benches" / case.name, actuator, noise)
-        write_key(case, key, actuator, noise, signals, rivals)
+        for one in with_twin(case):
+            names.append(one.name)
+            key = Path(folder) / "keys" / f"{one.name}.json"
+            if not key.exists():
+                signals = write_bench(one, Path(folder) / "benches" / one.bench, actuator, noise)
+                write_key(one, key, actuator, noise, signals, rivals)
     return names
 
 
 def simulate_truth(
     case: Case, actuator: ActuatorParameters, step: float | None = None, sampled: bool = False
 ) -> list[dict[str, np.ndarray]]:
-    """Noise-free signals of each recording; a case with other forms runs on the other integrator.
+    """Noise-free signals of each recording, before a measuring chain's disturbances.
 
-    ``step`` (s) lets every case run on it, ``sampled`` with events at the steps only (see ``simulate_fixed_step``).
+    A case with other forms, or with what only the other integrator has, runs on that one. ``step`` (s) lets every case
+    run on it, ``sampled`` with events at the steps only (see ``simulate_fixed_step``).
     """
-    if not case.forms and step is None:
+    actuator = with_controller(actuator, case.controller)
+    if not (case.forms or case.fixed_step) and step is None:
         states = [(case.unit(), np.array(plan.fault)) for plan in case.recordings]
         return simulate_plans(actuator, case.recordings, states)
     out = []
-    for plan in case.recordings:
+    for m, plan in enumerate(case.recordings):
         runs, command = runs_of(actuator, plan, [case.unit()], np.array([plan.fault]))
         timing = plan.duration, plan.interval, step or STEP
-        out.append(simulate_fixed_step(runs, command, *timing, case.forms, sampled))
+        rows, table = terms_of(case.unlisted, m, plan.duration)
+        terms = np.array(rows) if rows else None
+        slow = case.controller.get(FILTER, 0.0)
+        out.append(simulate_fixed_step(runs, command, *timing, case.forms, sampled, terms, table, slow))
     return out
 
 
@@ -92,20 +98,19 @@ def write_bench(
         if truncate:
             runs["speed_quantisation_step"] = 0.0
         measured = measure(signals, runs, scaled, case.noise_seed, n)
-        speed = measured["rotor_speed"][0]
-        recording = Recording(
-            time=time_axis(plan.duration, plan.interval),
-            phase_voltage=measured["phase_voltage"][0],
-            phase_current=measured["phase_current"][0],
-            phase_current_end=measured["phase_current_end"][0] if case.end_current else None,
-            rotor_speed=quantise_by_truncation(speed, step) if truncate else speed,
-            rotor_angle=measured["rotor_angle"][0],
-            output_position=measured["output_position"][0],
-            commanded_position=measured["commanded_position"][0],
-            bus_voltage=measured["bus_voltage"][0] if case.bus_voltage else None,
-            ambient_temperature=float(measured["ambient_temperature"][0]),
-            attributes={"command": plan.command, "health": plan.health, "unit": case.name},
-        )
+        ambient = float(measured.pop("ambient_temperature")[0])
+        shown = {name: values[0] for name, values in measured.items()}
+        if truncate:
+            shown["rotor_speed"] = quantise_by_truncation(shown["rotor_speed"], step)
+        shown["time"] = time_axis(plan.duration, plan.interval)
+        if not case.end_current:
+            del shown["phase_current_end"]
+        if not case.bus_voltage:
+            del shown["bus_voltage"]
+        change(case.unlisted, n, shown)
+        # not even a name of the unit: whatever it were, it could tell the case
+        said = {"command": plan.command, "health": plan.health, "unit": "unknown"}
+        recording = Recording(**shown, ambient_temperature=ambient, attributes=said)  # type: ignore[arg-type]
         write_recording(folder / f"recording_{n}.nc", recording)
     return truth
 
@@ -113,11 +118,18 @@ def write_bench(
 def write_key(
     case: Case, path: Path, actuator: ActuatorParameters, noise: SensorNoise, truth, rivals: bool = False
 ) -> None:
-    """Write the truth of a case, with its detectability where it holds an effect."""
+    """Write the truth of a case, with its detectability where it holds an effect or something unlisted.
+
+    Distances of effects are those of the plain bench; one of something unlisted is from that bench to the same one with
+    it alone.
+    """
     key: dict = {"case": case.to_dict(), "detectability": None, "fault_sd": None, "nearest_rival": None}
     key["actuator"], key["noise"] = asdict(actuator), asdict(noise)
+    if case.effects or case.unlisted:
+        plain = plain_twin(case)
+        signals = simulate_truth(plain, actuator) if is_disturbed(case) else truth
+        detector = Detector(plain, actuator, noise, signals)
     if case.effects:
-        detector = Detector(case, actuator, noise, truth)
         found = detector.detectability()
         key["detectability"] = {"nominal": found.nominal, "members": found.members}
         key["fault_sd"] = found.fault_sd
@@ -125,7 +137,23 @@ def write_key(
             distances = {r: detector.linear_rival(r) for r in near_rivals(next(iter(case.effects)))}
             nearest = min(distances, key=lambda r: distances[r])
             key["nearest_rival"] = {"effect": nearest, "distance": distances[nearest]}
+    if case.unlisted:
+        key["unlisted"] = [u.told(_apart(detector, plain, u, signals, actuator)) for u in case.unlisted]
     replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(key, indent=1)))
+
+
+def _apart(detector: Detector, plain: Case, one: Unlisted, signals, actuator: ActuatorParameters) -> float:
+    """Squared distance from a plain bench, of noise-free ``signals``, to the same one with something unlisted."""
+    if one.kind().at_sight:
+        return LATTICE
+    case = replace(plain, unlisted=(one,))
+    shifted = []
+    for m, values in enumerate(simulate_truth(case, actuator) if in_physics(case.unlisted) else signals):
+        shown = {name: np.array(x[0]) for name, x in values.items()}
+        shown["time"] = time_axis(plain.recordings[m].duration, plain.recordings[m].interval)
+        change(case.unlisted, m, shown)
+        shifted.append({name: shown[name][None] for name in values})
+    return detector.apart(signals, shifted)
 
 
 def write_key_without(key: Path, path: Path) -> None:
@@ -149,7 +177,7 @@ def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
     wanted = list(rivals)
     if not wanted:
         return {}
-    case = case_from_dict(key["case"])
+    case = plain_twin(case_from_dict(key["case"]))
     actuator, noise = ActuatorParameters(**key["actuator"]), SensorNoise(**key["noise"])
     detector = Detector(case, actuator, noise, simulate_truth(case, actuator))
     distance = detector.distance_to if len(case.effects) == 1 else detector.distance_in_place

@@ -1,11 +1,12 @@
 """What a blind case is and how it is drawn: the unit, its effects and faults, and the bench of recordings made of it.
 
 A case is a pure function of its rung and seed; one of T3 is that of T1 with its effect left out of the library, on the
-same recordings. Successive seeds go through the effects in order; rounds go through
-strata of the amplitude, each effect beginning elsewhere, so that a single round already holds weak and strong cases and
-any ``strata`` rounds are balanced.
+same recordings. One with something unlisted beside effects (T7) or another controller (T9) has a plain twin without it.
+Successive seeds go through the effects in order; rounds go through strata of the amplitude, each effect beginning
+elsewhere, so that a single round already holds weak and strong cases and any ``strata`` rounds are balanced.
 """
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 
@@ -13,8 +14,12 @@ import numpy as np
 
 from ..effects import EFFECTS
 from ..errors import InputError
+from .disturbances import FILTER, Unlisted, draw_controller, draw_unlisted, in_physics
 
-RUNGS = ("T0", "T1", "T2", "T3", "T4")
+RUNGS = ("T0", "T1", "T2", "T3", "T4", "T7", "T8", "T9")
+FIRST = 5  # rungs that there were before the others; their noise keeps its seeds
+#: of ten seeds of T7: how many effects and how many things unlisted
+MIXES = ((1, 1),) * 5 + ((2, 1),) * 2 + ((1, 2),) * 2 + ((2, 2),)
 STRATA = {"T1": 20, "T4": 5}  # amplitude strata per effect
 #: smallest amplitude of an effect, as a fraction of its realistic maximum: a third of what a typical bench shows at a
 #: squared distance of 25 (measured on other seeds), so that every effect's cases begin below the noise
@@ -85,16 +90,26 @@ class Case:
     strong_faults: bool = False
     left_out: tuple[str, ...] = ()  # effects that the library lacks when this case is diagnosed
     forms: tuple[str, ...] = field(default=())  # effects in their alternative form
+    unlisted: tuple[Unlisted, ...] = ()  # what no catalogue lists
+    controller: Mapping[str, float] = field(default_factory=dict)  # factors of its settings, or its filter (s)
+    plain: bool = False  # the twin without what is unlisted, under the nominal controller
+    fixed_step: bool = False  # on the other integrator
 
     @property
     def name(self) -> str:
         """Name of the case; it says nothing about the truth."""
-        return f"{self.rung.lower()}_{self.seed:06d}"
+        return _opaque(self.rung, self.seed, self.plain)
+
+    @property
+    def bench(self) -> str:
+        """Name of the bench: one of T3 has that of T1."""
+        return _opaque("T1" if self.rung == "T3" else self.rung, self.seed, self.plain)
 
     @property
     def noise_seed(self) -> int:
-        """Seed of the sensors' noise; one of each bench."""
-        return len(RUNGS) * self.seed + RUNGS.index("T1" if self.rung == "T3" else self.rung)
+        """Seed of the sensors' noise; one of each bench, a plain twin's is the same."""
+        place = RUNGS.index("T1" if self.rung == "T3" else self.rung)
+        return FIRST * self.seed + place if place < FIRST else 2**40 + len(RUNGS) * self.seed + place
 
     def unit(self) -> dict[str, dict[str, float]]:
         """Tolerances and effects together, as the simulation takes them."""
@@ -113,7 +128,13 @@ def case_from_dict(raw: Mapping) -> Case:
     fields = dict(raw)
     fields["recordings"] = tuple(RecordingPlan(**{**r, "fault": tuple(r["fault"])}) for r in raw["recordings"])
     fields["left_out"], fields["forms"] = tuple(raw["left_out"]), tuple(raw["forms"])
+    fields["unlisted"] = tuple(Unlisted(**u) for u in raw.get("unlisted", ()))
     return Case(**fields)
+
+
+def _opaque(rung: str, seed: int, plain: bool) -> str:
+    """A name from which nobody reads the rung or, by way of the seed, the effect."""
+    return hashlib.sha256(f"{rung} {seed} {plain}".encode()).hexdigest()[:12]
 
 
 def draw_case(rung: str, seed: int) -> Case:
@@ -132,6 +153,8 @@ def draw_case(rung: str, seed: int) -> Case:
     effects: dict[str, dict[str, float]] = {}
     amplitude: float | None = None
     strong = False
+    unlisted: tuple[Unlisted, ...] = ()
+    controller: dict[str, float] = {}
     if rung == "T0":
         strong = seed % 2 == 1
     elif rung == "T2":
@@ -139,6 +162,16 @@ def draw_case(rung: str, seed: int) -> Case:
         strong = kind >= 7
         for effect in rng.choice(ids, size=1 if strong else 2 if kind < 5 else 3, replace=False):
             effects[str(effect)] = draw_effect(str(effect), 10.0 ** rng.uniform(-1.0, 0.0), rng)
+    elif rung in ("T7", "T8", "T9"):
+        if rung == "T9":
+            controller, number = draw_controller(seed // 2, rng), seed % 2
+        else:
+            number, others = MIXES[seed % len(MIXES)] if rung == "T7" else (0, 1)
+            unlisted = draw_unlisted(others, seed, rng)
+        for effect in _different(seed // 2 if rung == "T9" else seed, number, rng):
+            share = 10.0 ** rng.uniform(-1.0, 0.0)
+            amplitude = share if number == 1 else None
+            effects[effect] = draw_effect(effect, share, rng)
     else:
         effect = ids[seed % len(ids)]
         stratum = stratum_of(seed, rung)
@@ -157,12 +190,38 @@ def draw_case(rung: str, seed: int) -> Case:
         amplitude=amplitude,
         strong_faults=strong,
         forms=tuple(effects) if rung == "T4" else (),
+        unlisted=unlisted,
+        controller=controller,
+        fixed_step=in_physics(unlisted) or FILTER in controller,
     )
 
 
 def without_effect(case: Case) -> Case:
     """The case of T3 on the bench of one of T1."""
     return replace(case, rung="T3", left_out=tuple(case.effects))
+
+
+def plain_twin(case: Case) -> Case:
+    """The same bench without what is unlisted and under the nominal controller."""
+    return replace(case, unlisted=(), controller={}, plain=True)
+
+
+def is_disturbed(case: Case) -> bool:
+    """Whether a case holds something unlisted or another controller."""
+    return bool(case.unlisted or case.controller)
+
+
+def with_twin(case: Case) -> tuple[Case, ...]:
+    """A case and, where it is compared with its plain twin, that one: T7 and T9."""
+    return (case, plain_twin(case)) if case.rung in ("T7", "T9") else (case,)
+
+
+def _different(turn: int, number: int, rng: np.random.Generator) -> list[str]:
+    """Effects of a case: the first goes through the catalogue by turns, others are drawn."""
+    ids = list(EFFECTS)
+    first = ids[turn % len(ids)]
+    rest = rng.choice([e for e in ids if e != first], max(0, number - 1), replace=False)
+    return [first, *(str(e) for e in rest)][:number]
 
 
 def stratum_of(seed: int, rung: str) -> int:

@@ -270,6 +270,21 @@ class Detector:
         cross = design.T @ shift - inner.T @ cho_solve(self.normal, self.jacobian.T @ shift)
         return self.squared(shift) - float(cross @ np.linalg.pinv(metric, rcond=1e-10, hermitian=True) @ cross)
 
+    def apart(self, one: Sequence[Mapping[str, np.ndarray]], other: Sequence[Mapping[str, np.ndarray]]) -> float:
+        """Squared distance between two benches' noise-free signals, nuisances and the truth's effects free, to first
+        order."""
+        parts = []
+        for fine, view, *signals in zip(self.case.recordings, self.views, one, other, strict=True):
+            first, second = (view.statistics(coarser(fine, s)[1]) for s in signals)
+            parts.append(view.whiten({n: second[n] - first[n] for n in first})[0])
+        shift = np.concatenate(parts)
+        effects = [e for e in self.case.effects if e != "speed_quantisation"]
+        if not effects:
+            return max(0.0, self.squared(shift) - self.repeat)
+        truth = self.case.effects
+        design = np.concatenate([self.columns(e, COORDINATES[e].point(truth[e])) for e in effects], 1)
+        return max(0.0, self.linear_distance(shift, design) - self.repeat)
+
     def linear_rival(self, effect: str) -> float:
         """First-order squared distance from the truth to an effect: quick, and too large for strong truths."""
         if effect == "speed_quantisation":

@@ -1,144 +1,143 @@
-"""What stands beside an effect in a mixed case: faults of the measuring chain and another controller, put in by the
-generator's side. None of it is in the catalogue; those ``OUTSIDE`` are in no grammar of the diagnosis either.
-"""
+"""Disturbances and other controllers: drawing them, and what a key says of them. None of it is in the catalogue."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
-from ..recording import Recording
+from .acting import ACTING
+from .disturbance import Acting, Kind, Signals
+from .measuring import MEASURING
 
-Change = Callable[[Recording, np.random.Generator], Recording]
-
-
-def _ends(recording: Recording, change: np.ndarray) -> np.ndarray | None:
-    end = recording.phase_current_end
-    return None if end is None else end + change
-
-
-def _late(x: np.ndarray, share: float) -> np.ndarray:
-    before = np.concatenate([x[:1], x[:-1]])
-    return (1.0 - share) * x + share * before
-
-
-def lag_voltage(recording: Recording, rng: np.random.Generator) -> Recording:
-    """The voltages are recorded up to one sample late."""
-    return replace(recording, phase_voltage=_late(recording.phase_voltage, rng.uniform(0.4, 1.0)))
-
-
-def spikes_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Single samples of one current are far off."""
-    current = recording.phase_current.copy()
-    hit = rng.choice(len(current), max(3, len(current) // 200), replace=False)
-    current[hit, rng.integers(3)] += rng.normal(0.0, 2.0, len(hit))
-    return replace(recording, phase_current=current)
-
-
-def held_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Samples of the currents repeat the one before."""
-    current = recording.phase_current.copy()
-    for k in np.sort(rng.choice(np.arange(1, len(current)), len(current) // 50, replace=False)):
-        current[k] = current[k - 1]
-    return replace(recording, phase_current=current)
-
-
-def steps_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """A converter's step of 0.02 to 0.05 A."""
-    step = rng.uniform(0.02, 0.05)
-    end = recording.phase_current_end
-    return replace(
-        recording,
-        phase_current=step * np.round(recording.phase_current / step),
-        phase_current_end=None if end is None else step * np.round(end / step),
-    )
-
-
-def drift_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """The offset of one current drifts."""
-    change = np.zeros_like(recording.phase_current)
-    change[:, rng.integers(3)] = rng.uniform(0.04, 0.12) * recording.time / recording.time[-1]
-    return replace(
-        recording, phase_current=recording.phase_current + change, phase_current_end=_ends(recording, change)
-    )
-
-
-def crosstalk_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """One current shows in another's channel."""
-    to, source = rng.choice(3, 2, replace=False)
-    gain, end = rng.uniform(0.01, 0.04), recording.phase_current_end
-    current = recording.phase_current.copy()
-    current[:, to] += gain * recording.phase_current[:, source]
-    if end is not None:
-        end = end.copy()
-        end[:, to] += gain * recording.phase_current_end[:, source]  # type: ignore[index]
-    return replace(recording, phase_current=current, phase_current_end=end)
-
-
-def mains_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """The currents pick the mains up together."""
-    wave = 0.06 * np.sin(2.0 * np.pi * 50.0 * recording.time + rng.uniform(0.0, 6.28))[:, None]
-    return replace(recording, phase_current=recording.phase_current + wave, phase_current_end=_ends(recording, wave))
-
-
-def wander_current(recording: Recording, rng: np.random.Generator) -> Recording:
-    """The offset of one current walks at random."""
-    change = np.zeros_like(recording.phase_current)
-    walk = np.cumsum(rng.standard_normal(len(change)))
-    change[:, rng.integers(3)] = 0.05 * walk / np.sqrt(len(change))
-    return replace(
-        recording, phase_current=recording.phase_current + change, phase_current_end=_ends(recording, change)
-    )
-
-
-def bent_voltage(recording: Recording, rng: np.random.Generator) -> Recording:
-    """The voltage channels are bent: a cubic part of their range."""
-    bend = rng.uniform(0.002, 0.006)
-    v = recording.phase_voltage
-    return replace(recording, phase_voltage=v * (1.0 - bend * (v / 24.0) ** 2))
-
-
-def hum_voltage(recording: Recording, rng: np.random.Generator) -> Recording:
-    """A hum whose strength follows the current lies on one voltage."""
-    v = recording.phase_voltage.copy()
-    j = rng.integers(3)
-    wave = np.sin(2.0 * np.pi * rng.uniform(80.0, 400.0) * recording.time)
-    v[:, j] += 0.02 * np.abs(recording.phase_current[:, j]) * wave
-    return replace(recording, phase_voltage=v)
-
-
-DISTURBANCES: dict[str, Change] = {
-    f.__name__: f
-    for f in (
-        lag_voltage, spikes_current, held_current, steps_current, drift_current, crosstalk_current, mains_current,
-        wander_current, bent_voltage, hum_voltage,
-    )
-}  # fmt: skip
-OUTSIDE = ("wander_current", "bent_voltage", "hum_voltage")
-#: settings of the controller and how far off they may be, either way
-CONTROLLER = ("position_gain", "speed_gain", "speed_integral_gain")
+DISTURBANCES: dict[str, Kind] = {**MEASURING.kinds, **ACTING.kinds}
+INSIDE = tuple(name for name, kind in DISTURBANCES.items() if kind.inside)
+OUTSIDE = tuple(name for name, kind in DISTURBANCES.items() if not kind.inside)
+#: smallest size that is drawn, as a share of the largest: about where a typical bench shows it at a squared distance of
+#: 10 to 30 (measured on other seeds), so that sizes go from what hardly shows to what cannot be overlooked
+SMALLEST = {
+    "bent_voltage": 0.3,
+    "crosstalk_current": 0.01,
+    "drift_current": 0.006,
+    "fan_torque": 0.004,
+    "flicker_current": 0.05,
+    "grease": 0.012,
+    "hum_voltage": 0.15,
+    "lag_voltage": 0.003,
+    "loosened_terminal": 0.04,
+    "mains_current": 0.012,
+    "once_per_turn": 0.005,
+    "order_angle": 0.025,
+    "pickup_voltage": 0.1,
+    "random_torque": 0.003,
+    "ringing": 0.05,
+    "seal": 0.006,
+    "slip_ring": 0.06,
+    "sparking_terminal": 0.05,
+    "tight_spot": 0.005,
+    "torque_step": 0.002,
+    "wander_current": 0.008,
+    "warm_up_voltage": 0.015,
+    "weak_magnet": 0.02,
+}
+USUAL_SMALLEST = 0.03
+#: settings of the controller that a factor may change, either way by at most ``FARTHEST``
+CONTROLLER = ("position_gain", "speed_gain", "speed_integral_gain", "current_limit", "speed_limit", "hysteresis")
 FARTHEST = 0.5
+FILTER = "filter_time"  # s, a filter of the current's reference that the nominal controller lacks
+SLOWEST_FILTER = 1e-3  # s
 
 
-def disturbed(recordings: Mapping[str, Recording], name: str, seed: int) -> dict[str, Recording]:
-    """Recordings with a disturbance put in; of the same kind and with its own draw in each.
+@dataclass(frozen=True)
+class Unlisted:
+    """One disturbance of a case; everything about it follows from these three."""
 
-    Raises
-    ------
-    InputError : an unknown disturbance
-    """
-    if name not in DISTURBANCES:
-        raise InputError(f"disturbance: '{name}' is not known, accepted are {', '.join(DISTURBANCES)}")
-    found = {}
-    for n, (file, recording) in enumerate(sorted(recordings.items())):
-        # which channel and how strongly belongs to the bench, what is random in time to the recording
-        rng = np.random.default_rng([seed, 0 if name not in ("spikes_current", "held_current") else n])
-        found[file] = DISTURBANCES[name](recording, rng)
-    return found
+    name: str
+    size: float  # share of its largest size
+    seed: int
+
+    def kind(self) -> Kind:
+        """What it is.
+
+        Raises
+        ------
+        InputError : an unknown disturbance
+        """
+        if self.name not in DISTURBANCES:
+            raise InputError(f"disturbance: '{self.name}' is not known, accepted are {', '.join(DISTURBANCES)}")
+        return DISTURBANCES[self.name]
+
+    def acting(self) -> Acting:
+        """The disturbance drawn."""
+        return self.kind().draw(self.size, np.random.default_rng([self.seed, 0]))
+
+    def own(self, recording: int) -> np.random.Generator:
+        """What is random in a recording of that number."""
+        return np.random.default_rng([self.seed, 1 + recording])
+
+    def told(self, distance: float) -> dict:
+        """What a key says of it; ``distance`` is the squared distance from the same bench without it."""
+        kind, acting = self.kind(), self.acting()
+        return {
+            "name": self.name, "inside": kind.inside, "form": kind.form, "equation": list(acting.equation),
+            "along": list(kind.along), "size": self.size, "distance": distance,
+            "parameters": {n: {"value": v, "units": u} for n, (v, u) in acting.parameters.items()},
+        }  # fmt: skip
 
 
-def draw_controller(seed: int) -> dict[str, float]:
-    """Factors of the controller's gains, within 50 % either way."""
-    rng = np.random.default_rng([9, seed])
-    return {name: float(1.0 + rng.uniform(-FARTHEST, FARTHEST)) for name in CONTROLLER}
+def draw_unlisted(number: int, seed: int, rng: np.random.Generator) -> tuple[Unlisted, ...]:
+    """Draw disturbances; every third seed's first one is outside the grammar, and the seeds go through all names."""
+    found: list[Unlisted] = []
+    for n in range(number):
+        turn, outside = divmod(seed + n, 3)
+        names = OUTSIDE if outside == 2 else INSIDE
+        at = 2 * turn + outside if outside != 2 else turn
+        name = names[(at + 7 * n) % len(names)]
+        if name not in [u.name for u in found]:
+            found.append(
+                Unlisted(name, float(SMALLEST.get(name, USUAL_SMALLEST) ** rng.random()), int(rng.integers(2**31)))
+            )
+    return tuple(found)
+
+
+def draw_controller(seed: int, rng: np.random.Generator) -> dict[str, float]:
+    """Draw factors of a controller's settings, or a filter: one of them by turns, or all gains at once."""
+    which = seed % (len(CONTROLLER) + 2)
+    if which == len(CONTROLLER):
+        return {FILTER: float(SLOWEST_FILTER * rng.uniform(0.1, 1.0))}
+    names = CONTROLLER[:3] if which > len(CONTROLLER) else (CONTROLLER[which],)
+    return {name: float(1.0 + rng.uniform(-FARTHEST, FARTHEST)) for name in names}
+
+
+def with_controller(actuator: ActuatorParameters, factors: Mapping[str, float]) -> ActuatorParameters:
+    """The actuator under another controller; a filter is not one of its settings."""
+    return replace(actuator, **{n: getattr(actuator, n) * f for n, f in factors.items() if n != FILTER})
+
+
+def terms_of(
+    unlisted: Sequence[Unlisted], recording: int, duration: float
+) -> tuple[list[np.ndarray], np.ndarray | None]:
+    """Terms of the physics in a recording of that number and duration (s), and the table that one may follow."""
+    rows: list[np.ndarray] = []
+    table = None
+    for one in unlisted:
+        acting = one.acting()
+        if acting.terms is not None:
+            more, own = acting.terms(duration, one.own(recording))
+            rows += list(more)
+            table = own if own is not None else table
+    return rows, table
+
+
+def change(unlisted: Sequence[Unlisted], recording: int, signals: Signals) -> None:
+    """Let disturbances of the measuring chain act on the signals of a recording of that number, in place."""
+    for one in unlisted:
+        acting = one.acting()
+        if acting.change is not None:
+            acting.change(signals, one.own(recording))
+
+
+def in_physics(unlisted: Sequence[Unlisted]) -> bool:
+    """Whether one of them acts in the physics, and not on the recorded signals alone."""
+    return any(one.acting().terms is not None for one in unlisted)

@@ -147,6 +147,46 @@ def _confusion(h: Mapping) -> str:
     return f"<tr><td>{h['truth']}</td><td>{h['said']}</td>{numbers}</tr>"
 
 
+def _part(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
+
+
+def _unlisted(lines: Sequence[Mapping]) -> str:
+    """What was put in that no catalogue lists, thing by thing."""
+    if not lines:
+        return ""
+    rows = "".join(
+        f"<tr><td>{u['unlisted'].replace('_', ' ')}{'' if u['inside'] else ' (outside)'}</td>"
+        + "".join(
+            f'<td class="n">{x}</td>' for x in (u["cases"], u["mixed"], *map(_part, _shares(u)), ", ".join(u["beside"]))
+        )
+        + "</tr>"
+        for u in lines
+    )
+    return f"""<h2>Beside what no catalogue lists (T7, T8)</h2><table><tr><th>unlisted</th><th>cases</th>
+<th>beside a detectable effect</th>
+<th>all listed named</th><th>another named</th><th>its equation</th><th>its form</th><th>oftenest beside</th></tr>
+{rows}</table>"""
+
+
+def _shares(u: Mapping) -> tuple[float | None, ...]:
+    return u["named"], u["another"], u["equation"], u["form"]
+
+
+def _rivals(lines: Sequence[Mapping]) -> str:
+    """Right and wrong names by the distance to the nearest rival."""
+    if not lines:
+        return ""
+    rows = "".join(
+        f"<tr><td>{u['low']:.0f}{'' if u['high'] is None else ' to {:.0f}'.format(u['high'])}</td>"
+        + "".join(f'<td class="n">{x}</td>' for x in (u["cases"], _part(u["right"]), _part(u["wrong_name"])))
+        + "</tr>"
+        for u in lines
+    )
+    return f"""<h2>Nearest rival, to first order (T1, T4, on a part of the cases)</h2><table>
+<tr><th>squared distance to it</th><th>cases</th><th>right</th><th>a wrong name</th></tr>{rows}</table>"""
+
+
 def _measured(rows: Sequence[Mapping]) -> str:
     """The rung on measured data: known distortions and left-out effects, machine by machine."""
     if not rows:
@@ -183,8 +223,10 @@ nominal model, nuisances marginalised, of 25 or more. <span class="aim">Aim met<
 <th>distance to what was said</th></tr>{hard}</table>
 <h2>Power</h2>{image["power"]}<h2>Reliability</h2>{image["reliability"]}
 <h2>Closure on held-out recordings</h2>{image["closure"]}
-<h2>Effect by effect</h2><table><tr><th>effect</th><th>T1 right</th><th>T3 called unknown</th><th>T4 right</th></tr>
-{effects}</table>
+<h2>Effect by effect</h2><table>
+<tr><th>effect</th><th>T1 right</th><th>T3 unknown or described</th><th>T4 right</th></tr>{effects}</table>
+{_unlisted(scores.get("by_unlisted") or [])}
+{_rivals(scores.get("rivals") or [])}
 {_measured(scores.get("measured") or [])}
 </body></html>
 """

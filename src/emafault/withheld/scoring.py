@@ -1,194 +1,27 @@
 """Scores of the withheld check: every metric with its bootstrap interval, over the rows of judged cases."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import rankdata
 
 from ..effects import EFFECTS
+from .described import change_without
+from .metrics import METRICS, Metric, Rows, reliability, share
 from .verdicts import IN_GROUP, judge, read_verdict
 
 LEVEL = 0.90  # of the bootstrap intervals
 RESAMPLES = 500
-BINS = 10
-Rows = Sequence[dict]
-
-
-@dataclass(frozen=True)
-class Metric:
-    """One line of the table: which cases it is taken over, how, and what a good result and the aim are.
-
-    ``sense`` is +1 where more is better, -1 where less is, 0 where good and aim are (low, high) ranges.
-    """
-
-    id: str
-    title: str
-    select: Callable[[dict], bool]
-    statistic: Callable[[Rows], float | None]
-    good: float | tuple[float, float] | None = None
-    aim: float | tuple[float, float] | None = None
-    sense: int = 1
-
-
-def share(field: str) -> Callable[[Rows], float | None]:
-    """Share of rows in which a field is true."""
-    return lambda rows: float(np.mean([bool(r[field]) for r in rows])) if rows else None
-
-
-def calibration_error(rows: Rows) -> float | None:
-    """Expected calibration error of the first hypothesis' probability, ten equal bins."""
-    table = reliability(rows)
-    total = sum(b["count"] for b in table)
-    return sum(b["count"] * abs(b["confidence"] - b["accuracy"]) for b in table) / total if total else None
-
-
-def reliability(rows: Rows) -> list[dict]:
-    """Mean confidence and share right of each bin of confidence that holds a case."""
-    if not rows:
-        return []
-    confidence = np.array([r["confidence"] for r in rows])
-    right = np.array([float(r["confident_right"]) for r in rows])
-    cell = np.minimum((confidence * BINS).astype(int), BINS - 1)
-    return [
-        {"confidence": float(confidence[cell == b].mean()), "accuracy": float(right[cell == b].mean()), "count": int(n)}
-        for b in range(BINS)
-        if (n := np.sum(cell == b))
-    ]
-
-
-def area_under_curve(rows: Rows) -> float | None:
-    """Probability that a left-out effect is given more ``unknown`` than a known one."""
-    out = np.array([bool(r["left_out"]) for r in rows])
-    if not rows or out.all() or not out.any():
-        return None
-    rank = rankdata([r["unknown"] for r in rows])
-    positives = int(out.sum())
-    return float((rank[out].sum() - positives * (positives + 1) / 2.0) / (positives * (len(rows) - positives)))
-
-
-def coverage(rows: Rows) -> float | None:
-    """Share of parameters whose interval holds the truth."""
-    every = [hit for r in rows for hit in r["covered"]]
-    return float(np.mean(every)) if every else None
-
-
-def closure(kind: str, stage: str = "after") -> Callable[[Rows], float | None]:
-    """Share of the closable gap that a stage of the ladder closes, ratio of sums over cases."""
-
-    def of(rows: Rows) -> float | None:
-        ladders = [r[kind] for r in rows if r[kind]]
-        below = sum(x["recalibrated"] - x["floor"] for x in ladders)
-        return sum(x["recalibrated"] - x[stage] for x in ladders) / below if below > 0.0 else None
-
-    return of
-
-
-def fault_closure(rows: Rows) -> float | None:
-    """Share of the closable fault-vector error that the diagnosis closes, ratio of sums."""
-    errors = [r["fault_vector"] for r in rows if r["fault_vector"]]
-    below = sum(e["before"] - e["oracle"] for e in errors)
-    return sum(e["before"] - e["after"] for e in errors) / below if below > 0.0 else None
-
-
-def fault_ratio(rows: Rows) -> float | None:
-    """Root mean square fault-vector error once diagnosed, over the oracle's."""
-    errors = [r["fault_vector"] for r in rows if r["fault_vector"]]
-    below = sum(e["oracle"] for e in errors)
-    return float(np.sqrt(sum(e["after"] for e in errors) / below)) if below > 0.0 else None
-
-
-def group_size(rows: Rows) -> float | None:
-    """Mean number of effects in the groups given."""
-    sizes = [len(r["named"]) for r in rows if r["answer"] == "group"]
-    return float(np.mean(sizes)) if sizes else None
-
-
-def _rung(*rungs: str, detectable: bool | None = True, **fields) -> Callable[[dict], bool]:
-    def select(row: dict) -> bool:
-        if row["rung"] not in rungs or (detectable is not None and row["detectable"] != detectable):
-            return False
-        return all(row[name] == value for name, value in fields.items())
-
-    return select
-
-
-def _count(number: int) -> Callable[[dict], bool]:
-    return lambda r: r["rung"] == "T2" and r["detectable"] and len(r["truth"]) == number
-
-
-def _single(rung: str) -> Callable[[dict], bool]:
-    return _rung(rung, detectable=None)
-
-
-def _mixed(row: dict) -> bool:
-    return row["rung"] == "T0" or (row["rung"] in ("T1", "T2") and row["detectable"])
-
-
-def _unknown_t3(row: dict) -> bool:
-    return row["rung"] == "T3" and row["detectable"] and row["answer"] == "unknown"
-
-
-def _apart(rows: Rows) -> float | None:
-    """Share given a name that lies further from the truth than a group may reach."""
-    if not rows:
-        return None
-    far = [r["wrong_name"] and min(r["rivals"].values(), default=np.inf) > IN_GROUP for r in rows]
-    return float(np.mean(far))
-
-
-_right, _wrong = share("right"), share("wrong_name")
-_both = _rung("T1", "T2")
-_weak = _rung("T0", detectable=None, strong_faults=False)
-_strong = _rung("T0", detectable=None, strong_faults=True)
-METRICS = (
-    Metric("right_t1", "right effect or group first, T1", _rung("T1"), _right, 0.95, 0.99),
-    Metric("right_t4", "right effect or group first, T4", _rung("T4"), _right, 0.80, 0.95),
-    Metric("pairs_t2", "two effects named exactly, T2", _count(2), _right, 0.85, 0.95),
-    Metric("wrong_t0", "a wrong name on effect-free data, T0", _single("T0"), _wrong, 0.05, 0.01, -1),
-    Metric("no_gap_t0", "no_gap returned, T0", _single("T0"), _right, 0.90, 0.97),
-    Metric("wrong_t3", "left-out effect given a wrong name, T3", _rung("T3"), _wrong, 0.08, 0.02, -1),
-    Metric(
-        "auroc_t3", "unknown against known, area under the ROC curve", _rung("T1", "T3"), area_under_curve, 0.93, 0.98
-    ),
-    Metric("equation_t3", "unknown placed in the right equation", _unknown_t3, share("equation_right"), 0.85, 0.97),
-    Metric("ece", "expected calibration error, T0, T1, T2", _mixed, calibration_error, 0.03, 0.015, -1),
-    Metric("coverage", "coverage of 90 % intervals, T1", _rung("T1"), coverage, (0.86, 0.94), (0.88, 0.92), 0),
-    Metric("closed_signal", "gap closed, signal", _both, closure("signal"), 0.95, 0.99),
-    Metric("closed_features", "gap closed, features", _both, closure("features"), 0.95, 0.99),
-    Metric("closed_faults", "gap closed, fault vector", _both, fault_closure, 0.90, 0.97),
-    Metric("placebo", "the placebo's share of the signal's gap", _both, closure("signal", "placebo"), 0.25, 0.10, -1),
-    Metric("fault_ratio", "fault-vector error once diagnosed, over the oracle's", _both, fault_ratio, 1.3, 1.05, -1),
-    # beside the table
-    Metric("right_t1_all", "right first, T1, every amplitude", _single("T1"), _right),
-    Metric("right_t4_all", "right first, T4, every amplitude", _single("T4"), _right),
-    Metric("wrong_t1", "a wrong name, T1", _rung("T1"), _wrong, sense=-1),
-    Metric("wrong_t1_all", "a wrong name, T1, every amplitude", _single("T1"), _wrong, sense=-1),
-    Metric("wrong_t4_all", "a wrong name, T4, every amplitude", _single("T4"), _wrong, sense=-1),
-    Metric("wrong_t0_weak", "a wrong name, T0 without strong faults", _weak, _wrong, sense=-1),
-    Metric("wrong_t0_strong", "a wrong name, T0 with strong faults", _strong, _wrong, sense=-1),
-    Metric("group_t2", "two effects named, or a group that no data tell apart, T2", _count(2), share("in_group")),
-    Metric("triples_t2", "three effects named exactly, T2", _count(3), _right),
-    Metric("faults_t2", "one effect beside strong faults, T2", _count(1), _right),
-    Metric("t2_all", "sets named exactly, T2, every amplitude", _single("T2"), _right),
-    Metric("unknown_t3", "unknown returned, T3", _rung("T3"), _right),
-    Metric("apart_t3", "a wrong name that the data tell apart, T3", _rung("T3"), _apart, sense=-1),
-    Metric("wrong_t3_all", "a wrong name, T3, every amplitude", _single("T3"), _wrong, sense=-1),
-    Metric("ece_all", "expected calibration error, every case", lambda row: True, calibration_error, sense=-1),
-    Metric("closed_signal_t4", "gap closed, signal, T4", _rung("T4"), closure("signal")),
-    Metric("group_size", "mean size of a group, T1", _single("T1"), group_size, sense=-1),
-)
 
 
 def score(folder: str | Path, seed: int = 0, processes: int = 1) -> dict:
     """Score what a folder holds: ``keys/NAME.json`` against ``diagnoses/NAME/diagnosis.json``.
 
-    ``oracles/NAME/diagnosis.json``, where present, is a diagnosis that was told the effect; else the best possible
-    error of the key stands for the oracle. Over so many ``processes`` the cases are shared out.
+    ``oracles/NAME/diagnosis.json``, where present, is a diagnosis that was told the effects. Over so many ``processes``
+    the cases are shared out.
 
     Returns
     -------
@@ -219,28 +52,43 @@ def _judged(key: Path) -> dict | None:
     return judge(json.loads(key.read_text()), read_verdict(verdict), told) | {"name": key.stem}
 
 
-def score_rows(rows: Rows, seed: int = 0) -> dict:
-    """Everything that the scoreboard shows, from judged rows."""
+def score_rows(every: Rows, seed: int = 0) -> dict:
+    """Everything that the scoreboard shows, from judged rows; plain twins are compared with and not counted."""
     rng = np.random.default_rng(seed)
+    rows = compared(every)
     return {
         "metrics": [_measure(metric, rows, rng) for metric in METRICS],
         "confusion": confusion(rows),
-        "reliability": reliability([r for r in rows if _mixed(r)]),
+        "reliability": reliability(rows),
         "power": power(rows),
+        "rivals": by_rival(rows),
         "hardest": hardest(rows),
         "by_effect": by_effect(rows),
-        "rows": list(rows),
+        "by_unlisted": by_unlisted(rows),
+        "rows": rows,
     }
 
 
+def compared(rows: Rows) -> list[dict]:
+    """Rows of the cases, each with what changes against its plain twin where it has one."""
+    plain = {r["bench"]: r for r in rows if r["plain"]}
+    cases = [r for r in rows if not r["plain"]]
+    return [r | change_without(r, plain[r["bench"]]) if r["bench"] in plain else r for r in cases]
+
+
 def _measure(metric: Metric, rows: Rows, rng: np.random.Generator) -> dict:
+    """Value of a metric with its interval, of benches drawn again: the cases of one bench are not independent."""
     chosen = [r for r in rows if metric.select(r)]
     value = metric.statistic(chosen)
     low = high = None
     if value is not None:
+        benches: dict[str, list[dict]] = {}
+        for r in chosen:
+            benches.setdefault(r["bench"], []).append(r)
+        each = list(benches.values())
         draws = []
         for _ in range(RESAMPLES):
-            again = metric.statistic([chosen[i] for i in rng.integers(0, len(chosen), len(chosen))])
+            again = metric.statistic([r for i in rng.integers(0, len(each), len(each)) for r in each[i]])
             if again is not None:
                 draws.append(again)
         low, high = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
@@ -268,7 +116,7 @@ def _met(metric: Metric, value: float | None, bound) -> bool | None:
 
 def _said(row: dict) -> str:
     """What a row's answer counts as in the confusion matrix."""
-    if row["answer"] in ("unknown", "no_gap"):
+    if row["answer"] in ("unknown", "no_gap", "described", "failed"):
         return str(row["answer"])
     if row["right"]:
         return str(row["truth"][0])
@@ -280,7 +128,7 @@ def _said(row: dict) -> str:
 
 def confusion(rows: Rows) -> dict:
     """Counts of what detectable single effects of T1 were called."""
-    labels = [*EFFECTS, "several", "wrong group", "unknown", "no_gap"]
+    labels = [*EFFECTS, "several", "wrong group", "described", "unknown", "no_gap", "failed"]
     counts = np.zeros((len(EFFECTS), len(labels)), int)
     for row in rows:
         if row["rung"] == "T1" and row["detectable"]:
@@ -315,6 +163,37 @@ def by_effect(rows: Rows) -> list[dict]:
             seen = [r for r in those if r["detectable"]]
             line[rung] = {"cases": len(those), "detectable": len(seen), "right": sum(bool(r["right"]) for r in seen)}
         out.append(line)
+    return out
+
+
+def by_unlisted(rows: Rows) -> list[dict]:
+    """Each thing unlisted: cases, how often the listed ones are named beside it, another beside, itself described."""
+    out = []
+    for name in sorted({u["name"] for r in rows for u in r["unlisted"]}):
+        those = [(r, u) for r in rows for u in r["unlisted"] if u["name"] == name]
+        mixed = [r for r, _ in those if r["rung"] == "T7" and r["detectable"]]
+        beside = Counter(e for r, _ in those for e in r["beside"]).most_common(3)
+        out.append(
+            {"unlisted": name, "inside": those[0][1]["inside"], "cases": len(those), "mixed": len(mixed),
+             "named": share("all_named")(mixed), "another": share("another")([r for r, _ in those]),
+             "equation": float(np.mean([u["equation_right"] for _, u in those])),
+             "form": float(np.mean([u["form_right"] for _, u in those])), "beside": [e for e, _ in beside]}
+        )  # fmt: skip
+    return out
+
+
+def by_rival(rows: Rows) -> list[dict]:
+    """Share right and wrongly named of detectable single effects against the distance to their nearest rival."""
+    edges = [0.0, IN_GROUP, 25.0, 100.0, 1e3, np.inf]
+    known = [r for r in rows if r["rung"] in ("T1", "T4") and r["detectable"] and r["nearest_rival"]]
+    out = []
+    for low, high in pairwise(edges):
+        those = [r for r in known if low <= r["nearest_rival"]["distance"] < high]
+        if those:
+            out.append(
+                {"low": low, "high": None if np.isinf(high) else high, "cases": len(those),
+                 "right": share("right")(those), "wrong_name": share("wrong_name")(those)}
+            )  # fmt: skip
     return out
 
 
