@@ -9,14 +9,14 @@ from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
 from .linear import OWN_FORM, White, assemble, full_model, white_rows
 from .linearisation import Carried, Linearisation, Task
-from .model import Parameter, Unit, Variant
+from .model import LISTED, Parameter, Unit, Variant
 from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Choice, Model, Search
 
 ROUNDS = 3
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
-CARRYING = 5  # units that carry their own form
+CARRYING = 6  # units that carry their own form
 STILL = 0.3  # prior standard deviations by which the point may still move
 REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
@@ -179,15 +179,19 @@ class Bench:
             out[unit.id] = {self.parameters[n].alias or n: d for n, d in sizes.items()}
         return out
 
-    def _carry_own_forms(self, search: Search) -> None:
-        """Units of good sets may take another form than the library's, in proportion to their size."""
-        chosen: dict[str, dict[str, float]] = {}
-        for model in search.ranked():
+    def _carry_own_forms(self, search: Search) -> bool:
+        """Units of the leading set, then those that explain most alone, may take another form than the library's, in
+        proportion to their size; whether any does that did not before."""
+        nothing = search.fit(())
+        alone = [search.fit((m,)) for m in search.candidates if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM]
+        good = [m for m in alone if m.log_posterior > nothing.log_posterior]
+        before = set(self.sizes)
+        for model in [search.ranked()[0], *sorted(good, key=lambda m: -m.log_posterior)]:
             for choice in model.choices:
-                if len(chosen) < CARRYING and self._kind(choice.unit) == "structural" and choice.unit not in chosen:
+                if len(self.sizes) < CARRYING and self._kind(choice.unit) in LISTED and choice.unit not in self.sizes:
                     names = self.names_of(choice)
-                    chosen[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
-        self.sizes = chosen
+                    self.sizes[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
+        return set(self.sizes) != before
 
     def names_of(self, choice: Choice) -> list[str]:
         """Columns of a unit's variant at the present point."""
@@ -380,10 +384,11 @@ class Bench:
             self.settle(NOTHING)
             whites, normal = self._renewed()
             self.reach = REACH[1]
+            if self._carry_own_forms(self._search(normal, False)):
+                whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, normal, FIRST, False)
-            self._carry_own_forms(search)
-            if self.sizes:
+            if self._carry_own_forms(search):
                 whites, normal = self._renewed()
         else:
             bench, fit = begun

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 
+LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One parameter: value at which it does nothing, prior mean and standard deviation where it is free.

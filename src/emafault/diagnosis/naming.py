@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from .model import Unit
+from .model import LISTED, Unit
 from .search import Model, posterior
 
 NAMED = 0.9
 PRESENT = 0.5  # of a remainder, from which it is more likely there than not
-LISTED = ("structural", "calibration")
 #: what the controller does with what it sees is no gap of the machine
 OWN_BUSINESS = ("remainder:control", "remainder:commutation")
 MEMBERS = 4  # largest group

@@ -11,13 +11,13 @@ from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .dual import Dual
 from .point import Point, State
-from .signals import Signals
+from .signals import REST, Signals
 from .terms import TERMS
 
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
-ZERO = 1e-6  # rad at the user shaft, by which the angle at rest is known
+ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 1.0  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 SKEW = 1e-6  # s, by which channels may be sampled apart
@@ -85,7 +85,7 @@ class ReferenceActuator:
             for channel in ("voltage", "current"):
                 full = f"skew.{channel}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
-            out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO, "rad")
+            out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO / a.gear_ratio, "rad")
             full = f"controller.timing@{name}"
             out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
             if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
