@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-
 LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
 
 
