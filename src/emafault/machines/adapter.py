@@ -94,7 +94,7 @@ class Recorded:
         key = dict(values), None if wanted is None else frozenset(wanted)
         kept = self._kept.get(name)
         if kept is None or kept[0] != key:
-            kept = self._kept[name] = key, [self._block(r, values, wanted) for r in self.rows[name]]
+            kept = self._kept[name] = key, [self.block(r, values, wanted) for r in self.rows[name]]
         return kept[1]
 
     def predict(self, rows: Rows, points: Sequence[Mapping[str, float]]) -> np.ndarray:
@@ -106,7 +106,8 @@ class Recorded:
         found = self.machine.equations[rows.equation](named, rows.inputs)
         return np.broadcast_to(found, (len(points), rows.size))
 
-    def _block(self, rows: Rows, values: Mapping[str, float], wanted: Collection[str] | None) -> Block:
+    def block(self, rows: Rows, values: Mapping[str, float], wanted: Collection[str] | None) -> Block:
+        """Rows linearised at a point, with columns by each parameter ``wanted``."""
         asked = [n for n in self.parameters if wanted is None or n in wanted]
         points: list[Mapping[str, float]] = [values]
         for n in asked:
@@ -158,7 +159,7 @@ class Recorded:
                     found += [np.cos(degree * along[name]), np.sin(degree * along[name])]
                 else:
                     z = 2.0 * (along[name] - low) / (high - low) - 1.0
-                    found.append(np.polynomial.legendre.Legendre.basis(degree)(np.clip(z, -1.5, 1.5)))
+                    found.append(np.polynomial.legendre.Legendre.basis(degree)(np.clip(z, -1.0, 1.0)))
         found = found[:SMOOTH]
         found += [np.zeros(rows.size)] * (SMOOTH - len(found))
         places = self.places[rows.equation]
@@ -185,6 +186,10 @@ class MeasuredBench(Bench):
     def linearise(self, model=None, renew=False):
         """See ``Bench``; there are no weights to renew."""
         return super().linearise(model)
+
+    def own_forms(self) -> dict[str, dict[str, float]]:
+        """Sizes from off, by column, of the units that carry their own form."""
+        return self._amounts(None)
 
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
         """See ``Bench``: each remainder in two variants, of every size up to the largest gap."""
