@@ -12,16 +12,20 @@ import numpy as np
 
 from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import Bench
+from ..diagnosis.linearisation import Task
 from ..diagnosis.model import Block, Parameter, Unit, Variant
-from ..diagnosis.search import Candidate
+from ..diagnosis.search import Candidate, Model
 from . import statement
 from .statement import Effect, Machine, Rows
 
 STEP = 1e-3  # prior standard deviations, of a difference that stands for a derivative
-SMOOTH = 14  # functions of a remainder along the coordinates; what follows is one function for each place
-DEGREE = 3  # of the polynomials along a coordinate
+SMOOTH = 14  # functions of a remainder that is smooth along the coordinates
+DEGREE = 3  # of its polynomials
+FINE, WAVES = 32, 16  # functions of one that changes faster, half waves over a coordinate's range; then one a place
 FEW = 6  # kinds of rows that may differ by a constant each
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # of a remainder over the noise of a row
+STILL, SETTLING = 0.01, 10  # prior standard deviations that the last step of the base model moves, and most steps
+COVERED = 0.6  # of what is possible of an instrument, the widest of its priors
 AMOUNT = 2.0  # prior width of an effect along a secant, in parts of its usual size
 ALONG = ("rotor_speed", "current", "rotor_angle", "time", "direction", "temperature")
 
@@ -44,6 +48,13 @@ class Recorded:
         self.names = {p.name: p.name if p.effect is None else f"{p.effect}.{p.name}" for p in machine.parameters}
         self.short = {full: name for name, full in self.names.items()}
         self.parameters = {self.names[p.name]: _core(self.names[p.name], p) for p in machine.parameters}
+        # nobody states a tolerance of these instruments: the widest prior covers all that is possible of one
+        self.reach = {
+            e.id: min(_reach(p) for p in machine.parameters if p.effect == e.id)
+            for e in machine.effects
+            if e.equations[0].startswith("sensor_") and not e.shapes
+        }
+        self.bounds = {self.names[p.name]: (p.low, p.high) for p in machine.parameters}
         for every in self.rows.values():
             for rows in every:
                 for k in range(0 if rows.shared is None else rows.shared.shape[1]):
@@ -147,7 +158,7 @@ class Recorded:
             places[key] = len(places)
 
     def functions(self, rows: Rows) -> np.ndarray:
-        """(function, row): a constant, functions of the coordinates, then one for each place that rows look at."""
+        """(function, row): a constant, smooth and faster functions of the coordinates, one for each place."""
         found = [np.ones(rows.size)]
         kinds = self.kinds[rows.equation]
         if 1 < len(kinds) <= FEW:
@@ -162,6 +173,14 @@ class Recorded:
                     found.append(np.polynomial.legendre.Legendre.basis(degree)(np.clip(z, -1.0, 1.0)))
         found = found[:SMOOTH]
         found += [np.zeros(rows.size)] * (SMOOTH - len(found))
+        for k in range(DEGREE + 1, WAVES + 1):
+            for name, (low, high) in self.ranges[rows.equation].items():
+                if name == "rotor_angle":
+                    found += [np.cos(k * along[name]), np.sin(k * along[name])]
+                else:
+                    found.append(np.cos(np.pi * k * np.clip((along[name] - low) / (high - low), 0.0, 1.0)))
+        found = found[: SMOOTH + FINE]
+        found += [np.zeros(rows.size)] * (SMOOTH + FINE - len(found))
         places = self.places[rows.equation]
         table = np.zeros((len(places), rows.size))
         table[[places[k] for k in _places(rows)], np.arange(rows.size)] = 1.0
@@ -184,25 +203,44 @@ class MeasuredBench(Bench):
     """The fit of a measured machine: noise as its rows state it, a remainder that is smooth or free at each place."""
 
     def linearise(self, model=None, renew=False):
-        """See ``Bench``; there are no weights to renew."""
-        return super().linearise(model)
+        """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
+        columns, aliases = self._columns_of(model)
+        wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
+        left = None
+        if model is not None:
+            left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
+        return self._each(Task(self.values(), wanted, left, self._amounts(model), corrected=False))
+
+    def fit(self, begun=None):
+        """See ``Bench``; the base model stands still before anything is compared with it."""
+        self.settle(Model((), 0.0, 0.0, {}, {}), still=STILL, steps=SETTLING)
+        return super().fit(begun)
+
+    def move(self, model, normal):
+        """See ``Bench``; the point stays where parameters are possible."""
+        largest = super().move(model, normal)
+        for n, (low, high) in self.machine.bounds.items():
+            self.point[n] = float(np.clip(self.point[n], low, high))
+        return largest
 
     def own_forms(self) -> dict[str, dict[str, float]]:
         """Sizes from off, by column, of the units that carry their own form."""
         return self._amounts(None)
 
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
-        """See ``Bench``: each remainder in two variants, of every size up to the largest gap."""
+        """See ``Bench``: each remainder in three variants, of every size up to the largest gap."""
         _, found = super().candidates(reduced)
         out: dict[tuple[str, int], Candidate] = {}
         for (unit, variant), candidate in found.items():
             if not unit.startswith("remainder:"):
-                out[unit, variant] = candidate
+                reach = self.machine.reach.get(unit, 1.0)
+                more = (reach,) if reach > 1.0 and len(candidate.widths) > 1 else ()
+                out[unit, variant] = replace(candidate, widths=(*more, *candidate.widths))
                 continue
-            smooth = np.array([int(n.rsplit(".", 1)[1]) < SMOOTH for n in candidate.names])
-            out[unit, 0] = _narrowed(candidate, smooth)
-            out[unit, 1] = replace(candidate, widths=SIZES)
-            self.remainders[unit] = Unit(unit, "remainder", (unit.split(":", 1)[1],), [Variant([]), Variant([])])
+            place = np.array([int(n.rsplit(".", 1)[1]) for n in candidate.names])
+            for v, most in enumerate((SMOOTH, SMOOTH + FINE, place.max() + 1)):
+                out[unit, v] = _narrowed(candidate, place < most)
+            self.remainders[unit] = Unit(unit, "remainder", (unit.split(":", 1)[1],), [Variant([])] * 3)
         return [*self.units, *self.remainders.values()], out
 
 
@@ -214,7 +252,15 @@ def _narrowed(c: Candidate, kept: np.ndarray) -> Candidate:
 
 
 def _core(full: str, p: statement.Parameter) -> Parameter:
-    return Parameter(full, p.off, p.mean, p.sd, p.units)
+    """A parameter; one of the base model that is never negative multiplies, and deviates in its logarithm."""
+    vanishes = 0.0 if p.effect is None and p.low >= 0.0 and p.mean > 0.0 else None
+    return Parameter(full, p.off, p.mean, p.sd, p.units, vanishes=vanishes)
+
+
+def _reach(p: statement.Parameter) -> float:
+    """Width of a prior that covers all that is possible of a parameter, over its usual one; 1 where nothing says it."""
+    reach = max(abs(p.high - p.off), abs(p.low - p.off))
+    return max(1.0, COVERED * reach / p.sd) if np.isfinite(reach) and p.mean == p.off else 1.0
 
 
 def _error(rows: Rows, k: int) -> str:

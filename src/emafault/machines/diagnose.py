@@ -10,13 +10,23 @@ from typing import Any
 from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import Fit, is_parameter
 from ..diagnosis.naming import Reading, read
-from ..diagnosis.search import Model
+from ..diagnosis.search import Choice, Model
 from . import held_out, verdict
 from .adapter import MeasuredBench, Recorded
 from .next_recording import next_recordings
 from .statement import Machine
 
 POLISHED, POLISHING = 0.01, 8  # prior standard deviations that the last step moves, and most steps
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A set at its own optimum: all parameters, sizes of the functions of remainders and own forms, and of the units
+    that carry the latter."""
+
+    values: Mapping[str, float]
+    functions: Mapping[str, float]
+    own: Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -39,11 +49,13 @@ class Fitted:
         """Whether anything is named or a remainder is there."""
         return bool(self.reading.named or self.reading.groups or self.reading.remainders)
 
-    def values(self, model: Model) -> dict[str, float]:
-        """All parameters at a set's own optimum, the nuisances with it."""
+    @cached_property
+    def settled(self) -> Settled:
+        """The leading set at its own optimum."""
         kept = dict(self.bench.point), set(self.bench.on)
-        self.bench.settle(model, self.fit.normal, POLISHED, POLISHING)
-        out = self.bench.values()
+        model = self.bench.settle(self.leading, self.fit.normal, POLISHED, POLISHING)
+        functions = {n: d for n, d in model.deviations.items() if not is_parameter(n)}
+        out = Settled(self.bench.values(), functions, self.bench.own_forms())
         self.bench.point, self.bench.on = kept
         return out
 
@@ -53,6 +65,13 @@ class Fitted:
         null = MeasuredBench(self.recorded, self.bench.recordings)
         null.settle(Model((), 0.0, 0.0, {}, {}), still=POLISHED, steps=POLISHING)
         return null
+
+    def log_evidence(self, choices: tuple[Choice, ...]) -> float:
+        """Log evidence of a set at its own optimum, up to a constant of the recordings."""
+        bench = MeasuredBench(self.recorded, self.bench.recordings)
+        if choices:
+            bench.point, bench.on, bench.sizes = dict(self.bench.point), set(self.bench.on), dict(self.bench.sizes)
+        return bench.settle(Model(choices, 0.0, 0.0, {}, {}), still=POLISHED, steps=POLISHING).log_likelihood
 
     def base(self) -> dict[str, float]:
         """Parameters of the recalibrated base model."""
@@ -77,8 +96,6 @@ class Diagnosed:
     verdict: dict[str, Any]
     explored: Fitted
     whole: Fitted
-    before: Mapping[str, float]  # parameters of the recalibrated base model, and at the leading set
-    after: Mapping[str, float]
 
 
 def fitted(recorded: Recorded, machine: Machine) -> Fitted:
@@ -102,8 +119,7 @@ def diagnose(machine: Machine, experiments: bool = True) -> Diagnosed:
     if machine.confirm:
         every = (*machine.explore, *machine.confirm)
         whole = fitted(Recorded(machine, every), machine)
-    before, after = whole.base(), whole.values(whole.leading)
-    out = verdict.build(machine, whole, sealed, before, after)
+    out = verdict.build(machine, whole, sealed)
     if machine.confirm:
         opened = Recorded(machine, every, explored.recorded)
         out["shrinks"]["signal"] = held_out.ladder(explored, opened, machine.confirm)
@@ -111,8 +127,8 @@ def diagnose(machine: Machine, experiments: bool = True) -> Diagnosed:
     for entry in out["discovered"]:
         entry["closed"] = held_out.closed_by(out["shrinks"]["signal"])
     if experiments:
-        out["next_experiment"] = next_recordings(machine, whole, after)
-    return Diagnosed(machine, out, explored, whole, before, after)
+        out["next_experiment"] = next_recordings(machine, whole)
+    return Diagnosed(machine, out, explored, whole)
 
 
 def seal(reading: Reading) -> dict[str, Any]:

@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from scipy.linalg import solve_triangular
 
 from ..diagnosis.closure import closed, placebo, rms, rows
 from ..diagnosis.fit import is_parameter
 from ..diagnosis.linear import White, assemble, own_columns, remainder_columns
-from ..diagnosis.search import OTHER_FORM, Choice, Search
 from .adapter import Recorded
 
 if TYPE_CHECKING:
@@ -31,8 +29,8 @@ def ladder(explored: "Fitted", opened: Recorded, confirm: Sequence[str]) -> dict
     leading = explored.leading
     after = rms(base)
     if explored.tells:
-        here = whitened(opened, confirm, off | _general(explored.values(leading)), explored.bench.own_forms())
-        after = with_functions(here, leading.deviations)
+        at = explored.settled
+        after = with_functions(whitened(opened, confirm, off | _general(at.values), at.own), at.functions)
     signal: dict[str, float | None] = {
         "nominal": rms(whitened(opened, confirm, off)), "recalibrated": rms(base),
         "placebo": placebo(
@@ -50,7 +48,9 @@ def _general(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def whitened(
-    recorded: Recorded, recordings: Sequence[str], values: Mapping[str, float],
+    recorded: Recorded,
+    recordings: Sequence[str],
+    values: Mapping[str, float],
     own: Mapping[str, Mapping[str, float]] | None = None,
 ) -> list[White]:
     """Residuals at frozen values under the covariance of all errors together, with the functions of remainders and of
@@ -74,12 +74,11 @@ def closed_by(signal: Mapping[str, float | None] | None) -> float | None:
     return None if signal is None else signal["closed"]
 
 
-def with_functions(whites: Sequence[White], deviations: Mapping[str, float]) -> float:
+def with_functions(whites: Sequence[White], functions: Mapping[str, float]) -> float:
     """Root mean square with the functions of remainders and own forms at these sizes."""
-    left = {n: d for n, d in deviations.items() if not is_parameter(n)}
-    names = sorted({n for w in whites for n in w.names if n in left})
+    names = sorted({n for w in whites for n in w.names if n in functions})
     normal = assemble(whites, names, {})
-    d = np.array([left[n] for n in names])
+    d = np.array([functions[n] for n in names])
     power = sum(float(w.gram[-1, -1]) for w in whites) + 2.0 * normal.g @ d + d @ normal.H @ d
     return float(np.sqrt(max(power, 0.0) / max(rows(whites), 1)))
 
@@ -101,26 +100,10 @@ def outcome(explored: "Fitted", whole: "Fitted") -> dict[str, Any]:
         said = "holds" if holds else "contradicted" if before.verdict == "no_gap" else "no claim"
         return {"outcome": said, "log_density": 0.0, "claimed": sorted(final)}
     listed = {u.id for u in whole.bench.units}
-    mine = [c for c in explored.leading.choices if c.unit in listed]
-    gain = _predictive(explored, whole, mine) - _predictive(explored, whole, ())
+    mine = tuple(c for c in explored.leading.choices if c.unit in listed)
+    gain = whole.log_evidence(mine) - explored.log_evidence(mine)
+    gain -= whole.log_evidence(()) - explored.log_evidence(())
     said = "holds" if gain > CLEAR else "contradicted" if gain < -CLEAR else "not seen"
     if not set(before.named) <= final:
         said = "rival" if final else "contradicted"
     return {"outcome": said, "log_density": round(float(gain), 3), "claimed": sorted(final)}
-
-
-def _predictive(explored: "Fitted", whole: "Fitted", choices: Sequence[Choice]) -> float:
-    """Log predictive density of what was set aside, given the explored recordings and a set, up to a constant."""
-    inside = set(explored.bench.recordings)
-    part = whole.bench.reduce(whole.bench.normal([w for w in whole.fit.whites if w.recording in inside]))
-    return _log_evidence(whole.fit.search, choices) - _log_evidence(
-        Search(part, *whole.bench.candidates(part)), choices
-    )
-
-
-def _log_evidence(search: Search, choices: Sequence[Choice]) -> float:
-    members = []
-    for c in choices:
-        own = [(c.unit, v) for v in (c.variant, c.variant % OTHER_FORM, 0)]
-        members += [m for m in own if m in search.candidates][:1]
-    return search.fit(tuple(members)).log_likelihood

@@ -19,7 +19,7 @@ TOLD = 5  # experiments in the verdict
 MOST = 13.8  # nats, a million to one: more is no more decided
 
 
-def next_recordings(machine: Machine, fitted: "Fitted", values: Mapping[str, float]) -> list[dict[str, Any]]:
+def next_recordings(machine: Machine, fitted: "Fitted") -> list[dict[str, Any]]:
     """Experiments of the machine's menu by the odds that they are expected to bring between the leading set and a rival.
 
     Each imagined recording is what the leading set predicts under the changed inputs; its normal matrix joins those of
@@ -42,7 +42,7 @@ def next_recordings(machine: Machine, fitted: "Fitted", values: Mapping[str, flo
         rows = [_imagined(r, experiment) for r in usual]
         if experiment is not again and all(r.inputs is u.inputs for r, u in zip(rows, usual, strict=True)):
             continue
-        search = _with(fitted, rows, values)
+        search = _with(fitted, rows, fitted.settled.values)
         for names, rival in kept:
             members = [tuple((c.unit, c.variant) for c in m.choices) for m in (leading, rival)]
             if not all(m in search.candidates for pair in members for m in pair):

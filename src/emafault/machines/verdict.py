@@ -31,14 +31,11 @@ def told(equation: str) -> str:
     return equation if equation in EQUATIONS else equation.rsplit("_", 1)[0]
 
 
-def build(
-    machine: Machine, fitted: "Fitted", sealed: Mapping[str, Any], before: Mapping[str, float],
-    after: Mapping[str, float],
-) -> dict[str, Any]:  # fmt: skip
+def build(machine: Machine, fitted: "Fitted", sealed: Mapping[str, Any]) -> dict[str, Any]:
     """The verdict of all recordings; what is held out is filled in by whoever opened it."""
     reading = fitted.reading
     found = regions(fitted)
-    base = _base(fitted, before, after)
+    base = _base(fitted)
     return {
         "bench": machine.case, "schema": SCHEMA, "twin": machine.name, "verdict": reading.verdict,
         "sealed": dict(sealed), "before_confirm": sealed["verdict"], "digest": sealed["digest"],
@@ -51,7 +48,7 @@ def build(
         "groups": [list(g) for g in reading.groups],
         "untold": untold(fitted),
         "base": base,
-        "residual": _residual(fitted, before, after),
+        "residual": _residual(fitted),
         "fault_vector": {},
         "biased_outputs": {
             n: b["before"]["value"] - b["after"]["value"]
@@ -165,10 +162,10 @@ def _discovered(fitted: "Fitted", found: Sequence[Mapping]) -> list[dict[str, An
     return out
 
 
-def _base(fitted: "Fitted", before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+def _base(fitted: "Fitted") -> dict[str, dict[str, Any]]:
     """Parameters of the base model before and after, with 90 % intervals."""
     bench, normal = fitted.bench, fitted.fit.normal
-    model = fitted.leading
+    before, after, model = fitted.base(), fitted.settled.values, fitted.leading
     names = [*bench.nuisances, *(n for n in model.deviations if n in normal.index and is_parameter(n))]
     k = np.array([normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
@@ -186,13 +183,14 @@ def _base(fitted: "Fitted", before: Mapping[str, float], after: Mapping[str, flo
     return out
 
 
-def _residual(fitted: "Fitted", before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, dict[str, float]]:
+def _residual(fitted: "Fitted") -> dict[str, dict[str, float]]:
     """Root mean square of each equation's whitened residual, of the recalibrated base model and of the named set."""
     out: dict[str, dict[str, float]] = {}
-    own = {n: d for n, d in fitted.leading.deviations.items() if n.startswith("own.")} if fitted.tells else {}
-    for stage, values in (("before", before), ("after", after)):
+    at = fitted.settled
+    own = {n: d for n, d in at.functions.items() if n.startswith("own.")} if fitted.tells else {}
+    for stage, values in (("before", fitted.base()), ("after", at.values)):
         general = {n: 0.0 if "@" in n else v for n, v in values.items()}
-        whites = whitened(fitted.recorded, fitted.bench.recordings, general, fitted.bench.own_forms())
+        whites = whitened(fitted.recorded, fitted.bench.recordings, general, at.own)
         for equation in dict.fromkeys(told(w.equation) for w in whites):
             mine = [w for w in whites if told(w.equation) == equation]
             out.setdefault(equation, {})[stage] = with_functions(mine, own if stage == "after" else {})

@@ -84,15 +84,13 @@ def check_left_out(machine: Stated, case: str, arrays: Arrays, plain: Diagnosed)
     """One case with its strongest effect, and what leaves the same trace, left out of the library."""
     named = names_of(plain.verdict)
     listed = {u.id for u in plain.whole.bench.units}
-    singles = [
-        m for m in plain.whole.fit.search.ranked() if len(m.units) == 1 and m.units[0] in listed & set(named)
-    ]
+    singles = [m for m in plain.whole.fit.search.ranked() if len(m.units) == 1 and m.units[0] in listed & set(named)]
     if not singles:
         return []
     strongest = max(singles, key=lambda m: m.log_likelihood).units[0]
     out = same_trace(plain, strongest)
     found = diagnose(build(machine, case, arrays).without(*sorted(out)), False)
-    equations = tuple(told(e) for e in next(x.equations for x in plain.machine.effects if x.id == strongest))
+    equations = acts_in(plain, strongest)
     placed = placed_in(found.verdict)
     now = names_of(found.verdict)
     return [
@@ -102,6 +100,15 @@ def check_left_out(machine: Stated, case: str, arrays: Arrays, plain: Diagnosed)
             _refused(found.verdict, placed, equations),
         )
     ]  # fmt: skip
+
+
+def acts_in(plain: Diagnosed, effect: str) -> tuple[str, ...]:
+    """Equations in whose rows an effect shows."""
+    unit = next(u for u in plain.whole.bench.units if u.id == effect)
+    names = {p.name for p in unit.parameters}
+    base = plain.whole.base()
+    found = [b for n in plain.whole.bench.recordings for b in plain.whole.recorded.blocks(base, n, wanted=names)]
+    return tuple(sorted({told(b.equation) for b in found if b.columns}))
 
 
 def same_trace(plain: Diagnosed, effect: str) -> set[str]:
