@@ -238,8 +238,9 @@ class MeasuredBench(Bench):
                 out[unit, variant] = replace(candidate, widths=(*more, *candidate.widths))
                 continue
             place = np.array([int(n.rsplit(".", 1)[1]) for n in candidate.names])
-            for v, most in enumerate((SMOOTH, SMOOTH + FINE, place.max() + 1)):
-                out[unit, v] = _narrowed(candidate, place < most)
+            free = place >= SMOOTH + FINE
+            for v, kept in enumerate((place < SMOOTH, ~free, free)):
+                out[unit, v] = _narrowed(candidate, kept)
             self.remainders[unit] = Unit(unit, "remainder", (unit.split(":", 1)[1],), [Variant([])] * 3)
         return [*self.units, *self.remainders.values()], out
 

@@ -90,7 +90,7 @@ def outcome(explored: "Fitted", whole: "Fitted") -> dict[str, Any]:
     -------
     ``outcome``: ``holds``, they are more probable with it; ``contradicted``, less; ``not seen``, alike; ``rival``, all
     recordings together name something else; ``no claim``, nothing was named. ``log_density``: log predictive density
-    of these recordings with what was named less that of the recalibrated base model. ``claimed``: what is left to claim.
+    of these recordings with what was named less that of the recalibrated base model. ``claimed``: what is left.
     """
     before, after = explored.reading, whole.reading
     sealed = {*before.named, *(e for g in before.groups for e in g)}

@@ -20,7 +20,7 @@ MOST = 13.8  # nats, a million to one: more is no more decided
 
 
 def next_recordings(machine: Machine, fitted: "Fitted") -> list[dict[str, Any]]:
-    """Experiments of the machine's menu by the odds that they are expected to bring between the leading set and a rival.
+    """Experiments of the machine's menu by the odds that they should bring between the leading set and a rival.
 
     Each imagined recording is what the leading set predicts under the changed inputs; its normal matrix joins those of
     the recordings, and the change of the difference in log evidence is what it brings.

@@ -161,11 +161,12 @@ def _refused(verdict: Mapping[str, Any], placed: tuple[str, ...], equations: tup
 
 def _moved(plain: Mapping[str, Any], found: Mapping[str, Any], effect: str) -> bool:
     """Whether an effect's parameters differ from those of the undistorted case, if that names it too."""
-    before, after = (
-        next((e["parameters"] for e in v["which"] if effect in e["effects"] and "parameters" in e), {})
-        for v in (plain, found)
-    )
-    before = {k: p for k, p in before.items() if p["effect"] == effect}
+
+    def parameters(verdict: Mapping[str, Any]) -> dict[str, Any]:
+        entries = (e["parameters"] for e in verdict["which"] if effect in e["effects"] and "parameters" in e)
+        return {k: p for k, p in next(entries, {}).items() if p["effect"] == effect}
+
+    before, after = parameters(plain), parameters(found)
     if effect not in names_of(plain) or not before:
         return True
     return any(
