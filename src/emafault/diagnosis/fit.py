@@ -49,6 +49,8 @@ class Bench:
     processes : in which recordings are linearised side by side
     """
 
+    searching: type[Search] = Search
+
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         self.machine, self.recordings, self.processes = machine, list(recordings), processes
         self.parameters: dict[str, Parameter] = dict(machine.parameters)
@@ -380,7 +382,7 @@ class Bench:
         units, candidates = self.candidates(reduced)
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
-        search = Search(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
+        search = self.searching(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
         search.run()
         return search
 
@@ -416,7 +418,7 @@ class Bench:
             this = replace(model, choices=choices)
             at_point = self.normal(self.linearise(this), this)
             reduced = self.reduce(at_point)
-            search = Search(reduced, *self.candidates(reduced))
+            search = self.searching(reduced, *self.candidates(reduced))
             width = {
                 (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
                 for c in choices
