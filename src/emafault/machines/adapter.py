@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..diagnosis.evidence import Reduced
-from ..diagnosis.fit import Bench
+from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linearisation import Task
 from ..diagnosis.model import Block, Parameter, Unit, Variant
-from ..diagnosis.search import Candidate, Model
+from ..diagnosis.search import Candidate, Model, Search
 from . import statement
 from .statement import Effect, Machine, Rows
 
@@ -25,6 +25,8 @@ FINE, WAVES = 32, 16  # functions of one that changes faster, half waves over a 
 FEW = 6  # kinds of rows that may differ by a constant each
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # of a remainder over the noise of a row
 STILL, SETTLING = 0.01, 10  # prior standard deviations that the last step of the base model moves, and most steps
+ROUNDS, FINALISTS = 3, 8  # sets that are taken to their own optimum, and how often
+NEAR, CLOSE = 12.0, 0.5  # log posterior within which a set is one of them, and by which it must be better
 COVERED = 0.6  # of what is possible of an instrument, the widest of its priors
 AMOUNT = 2.0  # prior width of an effect along a secant, in parts of its usual size
 ALONG = ("rotor_speed", "current", "rotor_angle", "time", "direction", "temperature")
@@ -199,8 +201,16 @@ class Recorded:
         return "order" if along == "rotor_angle" and orders else along
 
 
+class MeasuredSearch(Search):
+    """Sets of up to five effects: instruments and constants of a measured machine have no tolerance that others take."""
+
+    size_prior = (0.40, 0.30, 0.15, 0.08, 0.05, 0.02)
+
+
 class MeasuredBench(Bench):
     """The fit of a measured machine: noise as its rows state it, a remainder that is smooth or free at each place."""
+
+    searching = MeasuredSearch
 
     def linearise(self, model=None, renew=False):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
@@ -212,9 +222,37 @@ class MeasuredBench(Bench):
         return self._each(Task(self.values(), wanted, left, self._amounts(model), corrected=False))
 
     def fit(self, begun=None):
-        """See ``Bench``; the base model stands still before anything is compared with it."""
+        """See ``Bench``; the base model stands still before anything is compared, and rivals are compared at their own
+        optimum: the leading set's is far from theirs where the priors are wide."""
         self.settle(Model((), 0.0, 0.0, {}, {}), still=STILL, steps=SETTLING)
-        return super().fit(begun)
+        super().fit(begun)
+        for _ in range(ROUNDS):
+            whites = self.linearise()
+            normal = self.normal(whites)
+            search = self._search(normal)
+            if not self._to_the_best(search):
+                break
+        return Fit(dict(self.point), whites, self.weights, search.ranked(), search.reduced, normal, search)
+
+    def _to_the_best(self, search: Search) -> bool:
+        """Move to the finalist that is the most probable at its own optimum; whether it is not the leading one."""
+        ranked = search.ranked()
+        finalists: dict[tuple[str, ...], Model] = {}
+        for model in ranked:
+            if model.log_posterior > ranked[0].log_posterior - NEAR and len(finalists) < FINALISTS:
+                finalists.setdefault(model.units, model)
+        begun = dict(self.point), set(self.on)
+        reached = []
+        for model in finalists.values():
+            self.point, self.on = dict(begun[0]), set(begun[1])
+            found = self.settle(replace(model, log_posterior=0.0), still=STILL, steps=SETTLING)
+            reached.append((found.log_posterior, dict(self.point), set(self.on)))
+        best = max(range(len(reached)), key=lambda k: reached[k][0])
+        if best == 0 or reached[best][0] < reached[0][0] + CLOSE:
+            self.point, self.on = begun
+            return False
+        self.point, self.on = reached[best][1:]
+        return True
 
     def move(self, model, normal):
         """See ``Bench``; the point stays where parameters are possible."""

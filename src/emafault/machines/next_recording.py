@@ -79,4 +79,4 @@ def _with(fitted: "Fitted", rows: list[Rows], values: Mapping[str, float]) -> Se
         block = recorded.block(at, bench.values(), set(wanted))
         more.append(compressed(block, *white_rows(block, wanted, False), None))
     reduced = bench.reduce(bench.normal([*fitted.fit.whites, *more]))
-    return Search(reduced, *bench.candidates(reduced))
+    return bench.searching(reduced, *bench.candidates(reduced))
