@@ -21,12 +21,13 @@ from .statement import Effect, Machine, Rows
 STEP = 1e-3  # prior standard deviations, of a difference that stands for a derivative
 SMOOTH = 14  # functions of a remainder that is smooth along the coordinates
 DEGREE = 3  # of its polynomials
-FINE, WAVES = 32, 16  # functions of one that changes faster, half waves over a coordinate's range; then one a place
+WAVES = 24  # functions of one that changes faster along one coordinate: half waves over its range, orders of a turn
 FEW = 6  # kinds of rows that may differ by a constant each
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # of a remainder over the noise of a row
 STILL, SETTLING = 0.01, 10  # prior standard deviations that the last step of the base model moves, and most steps
-ROUNDS, FINALISTS = 3, 8  # sets that are taken to their own optimum, and how often
+ROUNDS, FINALISTS = 3, 6  # sets that are taken to their own optimum, and how often
 NEAR, CLOSE = 12.0, 0.5  # log posterior within which a set is one of them, and by which it must be better
+UNSEEN = 1.0  # information over that of the prior, below which rows say nothing of an effect
 COVERED = 0.6  # of what is possible of an instrument, the widest of its priors
 AMOUNT = 2.0  # prior width of an effect along a secant, in parts of its usual size
 ALONG = ("rotor_speed", "current", "rotor_angle", "time", "direction", "temperature")
@@ -175,14 +176,13 @@ class Recorded:
                     found.append(np.polynomial.legendre.Legendre.basis(degree)(np.clip(z, -1.0, 1.0)))
         found = found[:SMOOTH]
         found += [np.zeros(rows.size)] * (SMOOTH - len(found))
-        for k in range(DEGREE + 1, WAVES + 1):
-            for name, (low, high) in self.ranges[rows.equation].items():
-                if name == "rotor_angle":
-                    found += [np.cos(k * along[name]), np.sin(k * along[name])]
-                else:
-                    found.append(np.cos(np.pi * k * np.clip((along[name] - low) / (high - low), 0.0, 1.0)))
-        found = found[: SMOOTH + FINE]
-        found += [np.zeros(rows.size)] * (SMOOTH + FINE - len(found))
+        for name, (low, high) in self.ranges[rows.equation].items():
+            if name == "rotor_angle":
+                turns = np.outer(DEGREE + 1 + np.arange(WAVES // 2), along[name])
+                found += [*np.cos(turns), *np.sin(turns)]
+            else:
+                z = np.clip((along[name] - low) / (high - low), 0.0, 1.0)
+                found += [*np.cos(np.pi * np.outer(DEGREE + 1 + np.arange(WAVES), z))]
         places = self.places[rows.equation]
         table = np.zeros((len(places), rows.size))
         table[[places[k] for k in _places(rows)], np.arange(rows.size)] = 1.0
@@ -202,9 +202,28 @@ class Recorded:
 
 
 class MeasuredSearch(Search):
-    """Sets of up to five effects: instruments and constants of a measured machine have no tolerance that others take."""
+    """Sets of up to five effects: constants of instruments have no tolerance that others would take."""
 
     size_prior = (0.40, 0.30, 0.15, 0.08, 0.05, 0.02)
+
+    def fit(self, members, widths=None):
+        """See ``Search``; an effect of which the rows say nothing pays nothing for the choice of its width."""
+        known = tuple(sorted(members)) in self.seen
+        model = super().fit(members, widths)
+        if not known:
+            unpaid = sum(self._unpaid(self.candidates[m]) for m in members)
+            model.log_posterior += unpaid
+            model.log_likelihood += unpaid
+        return model
+
+    def _unpaid(self, c: Candidate) -> float:
+        """Log of the mean over the widths of a prior over the best of them, of an effect that leaves no trace."""
+        information = self.reduced.M[c.index, c.index] * (c.widths[0] * c.sd) ** 2
+        if information.sum() > UNSEEN or len(c.widths) == 1:
+            return 0.0
+        share = np.array(c.widths) / c.widths[0]
+        each = np.prod(1.0 / np.sqrt(1.0 + np.outer(share**2, np.maximum(information, 0.0))), axis=1)
+        return float(np.log(len(share) * each.mean() / each.max()))
 
 
 class MeasuredBench(Bench):
@@ -236,11 +255,16 @@ class MeasuredBench(Bench):
 
     def _to_the_best(self, search: Search) -> bool:
         """Move to the finalist that is the most probable at its own optimum; whether it is not the leading one."""
-        ranked = search.ranked()
+        # an own form may have taken up what another effect of the library is: sets without any are finalists as well
+        sizes, self.sizes = self.sizes, {}
+        plain = self._search(self.normal(self.linearise())) if sizes else search
+        self.sizes = sizes
         finalists: dict[tuple[str, ...], Model] = {}
-        for model in ranked:
-            if model.log_posterior > ranked[0].log_posterior - NEAR and len(finalists) < FINALISTS:
-                finalists.setdefault(model.units, model)
+        for ranked in (search.ranked(), plain.ranked()):
+            most = len(finalists) + FINALISTS
+            for model in ranked:
+                if model.log_posterior > ranked[0].log_posterior - NEAR and len(finalists) < most:
+                    finalists.setdefault(tuple(u for u in model.units if not u.startswith("remainder:")), model)
         begun = dict(self.point), set(self.on)
         reached = []
         for model in finalists.values():
@@ -266,7 +290,7 @@ class MeasuredBench(Bench):
         return self._amounts(None)
 
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
-        """See ``Bench``: each remainder in three variants, of every size up to the largest gap."""
+        """See ``Bench``: each remainder smooth, fast along a coordinate or free, of any size up to the largest gap."""
         _, found = super().candidates(reduced)
         out: dict[tuple[str, int], Candidate] = {}
         for (unit, variant), candidate in found.items():
@@ -275,11 +299,14 @@ class MeasuredBench(Bench):
                 more = (reach,) if reach > 1.0 and len(candidate.widths) > 1 else ()
                 out[unit, variant] = replace(candidate, widths=(*more, *candidate.widths))
                 continue
+            equation = unit.split(":", 1)[1]
             place = np.array([int(n.rsplit(".", 1)[1]) for n in candidate.names])
-            free = place >= SMOOTH + FINE
-            for v, kept in enumerate((place < SMOOTH, ~free, free)):
-                out[unit, v] = _narrowed(candidate, kept)
-            self.remainders[unit] = Unit(unit, "remainder", (unit.split(":", 1)[1],), [Variant([])] * 3)
+            coordinates = range(len(self.machine.ranges[equation]))
+            block = (place - SMOOTH) // WAVES
+            kept = [place < SMOOTH, *((place < SMOOTH) | (block == c) for c in coordinates), block >= len(coordinates)]
+            for v, functions in enumerate(kept):
+                out[unit, v] = _narrowed(candidate, functions)
+            self.remainders[unit] = Unit(unit, "remainder", (equation,), [Variant([])] * len(kept))
         return [*self.units, *self.remainders.values()], out
 
 
