@@ -68,3 +68,13 @@ def test_a_statement_that_does_not_fit_together_is_said(table, tmp_path, capsys)
     (tmp_path / "mine.py").write_text(text)
     assert run(table, str(tmp_path / "mine.py")) == 2
     assert "effect 'self_cooling' has no parameter" in capsys.readouterr().err
+
+
+def test_the_example_of_the_page_on_machines_works(table, tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "machines.md").read_text()
+    lines = text[text.index("    from emafault.machines.files import") :].splitlines()
+    end = next(k for k, x in enumerate(lines) if x and not x.startswith("    "))
+    (tmp_path / "mine.py").write_text("\n".join(x[4:] for x in lines[:end]))
+    assert run(table, str(tmp_path / "mine.py")) == 0
+    verdict = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert verdict["which"][0]["effects"] == ["constant_drop"]
