@@ -13,6 +13,7 @@ from ..figures.page import Page
 from .diagnose import Diagnosed
 
 MOST = 8  # sets in the table
+TOLD = 6  # parameters in a sentence
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
 
 
@@ -23,8 +24,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     sure = [e for e, p in verdict["inclusion"].items() if p >= 0.9]
     if kind in ("explained", "partly", "group") and sure:
         names = ", ".join(sure).replace("_", " ")
-        fitted = _fitted({n: p for n, p in first.get("parameters", {}).items() if p["effect"] in sure})
-        out.append(f"{names[0].upper()}{names[1:]}" + (f": {fitted}." if fitted else "."))
+        fitted = {n: p for n, p in first.get("parameters", {}).items() if p["effect"] in sure}
+        sizes = f": {_fitted(fitted)}" if 0 < len(fitted) <= TOLD else ""  # the table has them all
+        out.append(f"{names[0].upper()}{names[1:]}{sizes}.")
     for group in verdict["groups"]:
         out.append(f"One of a group that these recordings cannot tell apart: {_words(group)}.")
     if kind == "no_gap":
@@ -37,9 +39,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     out += [d["sentence"] for d in verdict["discovered"]]
     held, signal = verdict["held_out"], verdict["shrinks"]["signal"]
     if signal and signal["closed"] is not None and kind != "no_gap":
-        out.append(
-            f"On recordings not looked at before, what was sealed closes {100 * signal['closed']:.0f} % of the gap."
-        )
+        share = 100 * signal["closed"]
+        said = f"closes {share:.0f} % of the gap" if share > 0.5 else "leaves all of the gap, or more"
+        out.append(f"On recordings not looked at before, what was sealed {said}.")
     if held["outcome"] in ("contradicted", "rival"):
         out.append("The recordings set aside changed what is claimed: the seal says what was found before.")
     return out
