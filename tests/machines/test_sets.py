@@ -132,6 +132,15 @@ def test_the_strongest_effect_left_out_leaves_a_remainder():
     assert row.kind == "left out" and row.right and "viscous_asymmetry" in row.what
 
 
+def test_the_seal_of_a_set_does_not_depend_on_what_is_set_aside():
+    case, given = arrays("propeller_sweep", "motor d")
+    plain = usual("propeller_sweep", "motor d").verdict
+    late = np.isin([f"propeller {p:g}" for p in given["propeller"]], plain["recordings"]["confirm"])
+    other = diagnosed("propeller_sweep", case, given | {"v_bus_V": np.where(late, 1.3, 1.0) * given["v_bus_V"]})
+    assert late.any() and other.verdict["sealed"] == plain["sealed"]
+    assert other.verdict["verdict"] != plain["verdict"] or other.verdict["which"] != plain["which"]
+
+
 def test_two_phases_exchanged_in_one_file_are_no_shorted_turn():
     case, given = arrays("induction_currents", "ITSC_HLT")
     other = {**given, "healthy": cases("induction_currents")["ITSC_A10"]["healthy"]}

@@ -61,7 +61,7 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
     if total < 60:
         raise InputError(f"{case}: {total} steady rows at speed, at least 60 are needed")
     explore, confirm = _split(stretches, int(EXPLORE_SHARE * total))
-    scale = _scales(arrays, np.concatenate(stretches))
+    scale = _scales(arrays, np.concatenate(list(explore.values())))
     rows = [r for name, part in (explore | confirm).items() for r in _rows(name, part, total, arrays, scale)]
     note = f"{total} steady rows in {len(stretches)} operating condition(s); the first {EXPLORE_SHARE:.0%} explore"
     return rows, scale, tuple(explore), tuple(confirm), note

@@ -73,9 +73,11 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
     """
     motion = _motion(arrays)
     found = cycles(motion)
-    scale = {key: float(np.abs(motion[key]).max()) for key in ("v", "a", "F")}
-    scale["q"], scale["t"] = float(np.ptp(motion["q"])), float(motion["t"][-1])
-    middle = float(motion["q"].mean())
+    cut = max(1, len(found) // 2)
+    first = {key: values[: found[cut - 1].stop] for key, values in motion.items()}
+    scale = {key: float(np.abs(first[key]).max()) for key in ("v", "a", "F")}
+    scale["q"], scale["t"] = float(np.ptp(first["q"])), float(first["t"][-1])
+    middle = float(first["q"].mean())
     rows = [
         _rows(f"cycle {k}", {n: x[s] for n, x in motion.items()}, scale, middle) for k, s in enumerate(found, start=1)
     ]
@@ -83,7 +85,7 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
         raise InputError(
             f"{case}: a cycle has fewer than 6 bins of speed, direction and acceleration with enough samples"
         )
-    return rows, scale, max(1, len(found) // 2), len(found)
+    return rows, scale, cut, len(found)
 
 
 def _rows(name: str, x: Arrays, scale: Mapping[str, float], middle: float) -> Rows:

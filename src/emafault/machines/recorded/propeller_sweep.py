@@ -56,11 +56,15 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
         raise InputError(f"{case}: one propeller and one pack leave nothing to hold out")
     cut = max(1, round(0.6 * len(values)))
     names = [f"{along} {value:g}" for value in values]
+    first = np.isin(arrays[along], values[:cut])
     scale = {
-        "voltage": float(arrays["v_bus_V"].max()),
-        "current": float(arrays["i_bus_A"].max()),
-        "omega": float(arrays["speed_rpm"].max() * 2 * np.pi / 60),
+        "voltage": float(arrays["v_bus_V"][first].max()),
+        "current": float(arrays["i_bus_A"][first].max()),
+        "omega": float(arrays["speed_rpm"][first].max() * 2 * np.pi / 60),
     }
+    # a supply shows its limit where several propellers draw the same
+    near = arrays["i_bus_A"][first] > (1 - LIMIT_BAND) * scale["current"]
+    scale["limit"] = (1 - LIMIT_BAND) * scale["current"] if near.sum() > 2 else np.inf
     rows = [_rows(n, arrays, arrays[along] == value, scale) for n, value in zip(names, values, strict=True)]
     note = f"{arrays['v_bus_V'].size} full-throttle rows; {cut} of {len(values)} {along}s explore"
     return rows, scale, tuple(names[:cut]), tuple(names[cut:]), note
@@ -69,9 +73,7 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
 def _rows(name: str, arrays: Arrays, rows: np.ndarray, scale: Mapping[str, float]) -> Rows:
     voltage, current = arrays["v_bus_V"][rows], arrays["i_bus_A"][rows]
     omega = arrays["speed_rpm"][rows] * 2 * np.pi / 60
-    at_limit = (current > (1 - LIMIT_BAND) * scale["current"]) & (
-        (arrays["i_bus_A"] > (1 - LIMIT_BAND) * scale["current"]).sum() > 2
-    )
+    at_limit = current > scale["limit"]
     slope = 0.15 * scale["voltage"] / scale["current"]
     inputs = {
         "w": omega, "i": current, "limit": at_limit.astype(float), "i_max": np.full(current.size, scale["current"]),

@@ -107,8 +107,9 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
         raise InputError(f"{case}: {len(steps)} steady plateaus of continuous current, at least 6 are needed")
     top = int(np.argmax([np.median(arrays["w"][s]) for s in steps])) + 1
     cut = top if len(steps) - top >= 1 and top >= 5 else int(0.7 * len(steps))
-    scale = {key: float(np.abs(arrays[key]).max()) for key in ("v", "i", "w")}
-    scale["T"] = float(arrays["T"].max()) if "T" in arrays else scale["v"] * scale["i"] / scale["w"]
+    first = {key: values[: steps[cut - 1].stop] for key, values in arrays.items()}
+    scale = {key: float(np.abs(first[key]).max()) for key in ("v", "i", "w")}
+    scale["T"] = float(first["T"].max()) if "T" in arrays else scale["v"] * scale["i"] / scale["w"]
     notes = [f"{cut} plateaus explore, {len(steps) - cut} later ones confirm"]
     if "duty" not in arrays:
         notes.append("no duty in this log: only the power balance is tested, which holds R/k^2 and not R and k")
