@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from emafault import provenance
 from emafault.errors import InputError
 from emafault.machines.adapter import Recorded
 from emafault.machines.diagnose import Diagnosed, diagnose
@@ -184,3 +185,16 @@ def test_motion_in_one_direction_leaves_asymmetries_open():
     verdict = diagnose(replace(machine, rows=rows), experiments=False).verdict
     assert {"offset", "viscous_asymmetry"} & set(verdict["untold"])
     assert verdict["which"][0]["probability"] < 0.8 and names_of(verdict) == ()
+
+
+def test_the_workflow_sees_every_machine_and_nothing_of_the_older_way():
+    """A change of a machine's file makes its page anew."""
+    pending, seen = [Path(__file__).parents[2] / "workflow" / "scripts" / "diagnose_machines.py"], set()
+    while pending:
+        path = pending.pop()
+        if path not in seen:
+            seen.add(path)
+            pending += provenance._read_source(path)[1]
+    parts = {p.relative_to(provenance.PACKAGE) for p in seen if p.is_relative_to(provenance.PACKAGE)}
+    assert {Path("machines") / f"{name}.py" for name in MEASURED} <= parts
+    assert not any(p.parts[0] in ("gap", "twins") for p in parts)

@@ -2,22 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module, util
+from importlib import util
 from pathlib import Path
 from types import ModuleType
 
 from ..errors import InputError
+from . import back_emf, dq_machine, friction_axis, induction_currents, propeller_sweep, six_step_bus, slow_rotation
 from .statement import Arrays, Distortion, Machine
 
-MEASURED = (
-    "dq_machine",
-    "six_step_bus",
-    "propeller_sweep",
-    "back_emf",
-    "slow_rotation",
-    "friction_axis",
-    "induction_currents",
-)
+_MODULES: dict[str, ModuleType] = {
+    "dq_machine": dq_machine,
+    "six_step_bus": six_step_bus,
+    "propeller_sweep": propeller_sweep,
+    "back_emf": back_emf,
+    "slow_rotation": slow_rotation,
+    "friction_axis": friction_axis,
+    "induction_currents": induction_currents,
+}
+MEASURED = tuple(_MODULES)
 NEEDED = ("read", "build")
 ACCEPTED = "accepted is a Python file with read(path) -> {case: arrays} and build(case, arrays) -> Machine"
 
@@ -41,7 +43,7 @@ def stated(name: str) -> Stated:
         when there is none, or the file states none.
     """
     if name in MEASURED:
-        return _of(name, import_module(f"emafault.machines.{name}"))
+        return _of(name, _MODULES[name])
     if not name.endswith(".py"):
         raise InputError(
             f"--twin: got '{name}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"

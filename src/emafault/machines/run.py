@@ -7,7 +7,6 @@ from typing import Any
 
 import jsonschema
 
-from ..equations.run import SCHEMA_FILE
 from ..errors import InputError
 from ..figures.page import Page
 from ..recording import replace_atomically
@@ -15,6 +14,9 @@ from ..written import REPORT, VERDICT, file_name, log_diagnosis, results_folder,
 from .diagnose import Diagnosed, diagnose
 from .library import build, read_cases, stated
 from .page import draw, finding
+
+#: the format of every verdict, of the reference actuator's too
+SCHEMA_FILE = Path(__file__).parents[1] / "equations" / "verdict.schema.json"
 
 
 def diagnose_file(
