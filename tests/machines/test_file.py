@@ -63,11 +63,23 @@ def test_a_name_that_is_none_says_what_is_accepted(table, capsys):
     assert "absent.py: no such file" in capsys.readouterr().err
 
 
-def test_a_statement_that_does_not_fit_together_is_said(table, tmp_path, capsys):
-    text = MINE.read_text().replace('Effect("self_heating"', 'Effect("self_cooling"')
-    (tmp_path / "mine.py").write_text(text)
+@pytest.mark.parametrize(
+    ("stated", "instead", "said"),
+    [
+        ('Effect("self_heating"', 'Effect("self_cooling"', "effect 'self_cooling' has no parameter"),
+        ('"electrical"', '"voltage"', "equation 'voltage', accepted are electrical"),
+        ('"current", i, i, v', '"load", i, i, v', "lie along 'load', accepted are rotor_angle"),
+        ("i, i, v, variance", "i, i, v, 0.0 * variance", "a variance is not positive"),
+        ("i, i, v, variance", "i, i, v + np.nan, variance", "not a finite number"),
+        ('"V_drop", "V", 0.5', '"k", "V", 0.5', "parameter 'k' is stated twice"),
+    ],
+)
+def test_a_statement_that_does_not_fit_together_is_said(table, tmp_path, capsys, stated, instead, said):
+    assert stated in MINE.read_text()
+    (tmp_path / "mine.py").write_text(MINE.read_text().replace(stated, instead))
     assert run(table, str(tmp_path / "mine.py")) == 2
-    assert "effect 'self_cooling' has no parameter" in capsys.readouterr().err
+    error = capsys.readouterr().err.strip()
+    assert "\n" not in error and "mine" in error and said in error
 
 
 def test_the_example_of_the_page_on_machines_works(table, tmp_path):

@@ -12,7 +12,8 @@ from ..diagnosis.fit import Fit, is_parameter
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Choice, Model
 from . import held_out, verdict
-from .adapter import MeasuredBench, Recorded
+from .adapter import Recorded
+from .bench import MeasuredBench
 from .next_recording import next_recordings
 from .statement import Machine
 

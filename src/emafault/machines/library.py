@@ -6,9 +6,11 @@ from importlib import util
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from ..errors import InputError
 from . import back_emf, dq_machine, friction_axis, induction_currents, propeller_sweep, six_step_bus, slow_rotation
-from .statement import Arrays, Distortion, Machine
+from .statement import COORDINATES, EQUATIONS, Arrays, Distortion, Machine, told
 
 _MODULES: dict[str, ModuleType] = {
     "dq_machine": dq_machine,
@@ -136,12 +138,21 @@ def flaw(machine: Machine) -> str:
                 return (
                     f"effect '{effect.id}': a shape names {', '.join(sorted(set(shape) - set(mine)))}, which it has not"
                 )
+    beside: dict[tuple[str, str], set[str]] = {}
     for rows in machine.rows:
         if rows.equation not in machine.equations:
             return f"rows of '{rows.equation}', accepted are the equations {', '.join(machine.equations)}"
+        if told(rows.equation) not in EQUATIONS:
+            return f"equation '{rows.equation}', accepted are {', '.join(EQUATIONS)} and parts of one, as torque_front"
+        if rows.along not in COORDINATES:
+            return f"rows of {rows.equation} lie along '{rows.along}', accepted are {', '.join(COORDINATES)}"
         sizes = {len(rows.observed), len(rows.variance), len(rows.low), len(rows.high)}
         if len(sizes) > 1:
             return f"rows of {rows.equation} in '{rows.recording}': observed, variance, low and high differ in length"
+        if not np.isfinite(rows.observed).all():
+            return f"rows of {rows.equation} in '{rows.recording}': a measured value is not a finite number"
+        if set(rows.beside) != beside.setdefault((rows.equation, rows.along), set(rows.beside)):
+            return f"rows of {rows.equation} in '{rows.recording}': 'beside' names other coordinates than elsewhere"
         if not min(rows.variance, default=1.0) > 0.0:
             return f"rows of {rows.equation} in '{rows.recording}': a variance is not positive"
     return ""

@@ -11,6 +11,14 @@ Arrays = dict[str, np.ndarray]
 #: parameters by name, (point, 1) each, and inputs of the rows -> (point, row) what the equation says of them
 Equation = Callable[[Mapping[str, np.ndarray], Mapping[str, np.ndarray]], np.ndarray]
 
+#: equations that a verdict knows; one that is a part of another (``electrical_d``) is told as the whole
+EQUATIONS = (
+    "electrical", "electrical_a", "electrical_b", "electrical_c", "torque", "sensor_voltage", "sensor_current",
+    "sensor_speed", "sensor_angle", "sensor_output", "position", "bus", "control",
+)  # fmt: skip
+#: coordinates that rows may lie along
+COORDINATES = ("rotor_angle", "rotor_speed", "current", "temperature", "direction", "time", "order")
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -168,3 +176,8 @@ def freedom(
 ) -> Parameter:  # fmt: skip
     """A parameter that an effect frees: zero (``off``) without the effect."""
     return Parameter(name, units, off, mean, sd, low, high, effect)
+
+
+def told(equation: str) -> str:
+    """An equation's name in the verdict."""
+    return equation if equation in EQUATIONS else equation.rsplit("_", 1)[0]

@@ -9,7 +9,7 @@ from ..diagnosis.fit import is_parameter
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
 from .held_out import whitened, with_functions
-from .statement import Machine
+from .statement import Machine, told
 
 if TYPE_CHECKING:
     from .diagnose import Fitted
@@ -19,16 +19,6 @@ Z = 1.645  # standard deviations of a 90 % interval
 MOST = 12  # sets told
 BIASED = 0.25  # of an interval's width, by which a parameter moves that is told as biased
 SEEN = 1.0  # information over that of the prior, below which the recordings say nothing of a parameter
-#: equations that a verdict knows; one that is a part of another (``electrical_d``) is told as the whole
-EQUATIONS = (
-    "electrical", "electrical_a", "electrical_b", "electrical_c", "torque", "sensor_voltage", "sensor_current",
-    "sensor_speed", "sensor_angle", "sensor_output", "position", "bus", "control",
-)  # fmt: skip
-
-
-def told(equation: str) -> str:
-    """An equation's name in the verdict."""
-    return equation if equation in EQUATIONS else equation.rsplit("_", 1)[0]
 
 
 def build(machine: Machine, fitted: "Fitted", sealed: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from ..diagnosis.closure import rms
 from .diagnose import Diagnosed, diagnose
 from .held_out import whitened
 from .library import Stated, build, read_cases
-from .statement import Arrays
-from .verdict import Z, told
+from .statement import Arrays, told
+from .verdict import Z
 
 NEIGHBOUR = 0.95  # cosine of two signatures from which one effect stands in for the other
 WITHIN = 6.0  # squared distance that no data tell apart
