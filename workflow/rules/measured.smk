@@ -29,6 +29,28 @@ rule diagnose_measured:
         "../scripts/diagnose_measured.py"
 
 
+rule diagnose_machines:
+    input:
+        sets=rules.diagnose_measured.input.sets,
+        files=rules.diagnose_measured.input.files,
+        verdicts=rules.diagnose_measured.output.verdicts,
+        withheld=rules.diagnose_measured.output.withheld,
+    output:
+        report=f"{RESULTS}/measured/equations/report.html",
+        figures=directory(f"{RESULTS}/measured/equations/figures"),
+        verdicts=f"{RESULTS}/measured/equations/verdicts.json",
+        withheld=f"{RESULTS}/measured/equations/withheld.json",
+    log:
+        f"{RESULTS}/logs/measured/diagnose_machines.log",
+    resources:
+        mem_mb=1000,
+        runtime=20,
+    params:
+        code=code("diagnose_machines"),
+    script:
+        "../scripts/diagnose_machines.py"
+
+
 rule calibrate_measured:
     input:
         sets=rules.diagnose_measured.input.sets,
@@ -56,6 +78,7 @@ rule measured_calibration:
 
 
 rule measured:
-    """Diagnose the measured machines."""
+    """Diagnose the measured machines, by their equations and against simulation."""
     input:
+        rules.diagnose_machines.output.report,
         rules.diagnose_measured.output.report,

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from emafault.equations.run import diagnose_folder
-from emafault.gap.run import diagnose_path
+from emafault.machines.run import diagnose_file
 from emafault.progress import one_line_errors
 
 with one_line_errors(snakemake.log[0]):
@@ -12,4 +12,4 @@ with one_line_errors(snakemake.log[0]):
     if params.twin == "actuator":
         diagnose_folder(params.bench, params.spec, out)
     else:
-        diagnose_path(params.bench, params.spec, out=out, twin=params.twin)
+        diagnose_file(params.bench, params.twin, params.spec, out)

@@ -14,7 +14,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="Hydra overrides of the nominal actuator, as actuator.gear_ratio=400",
     )
     parser.add_argument("--out", metavar="DIR", help="folder to write to (results/diagnoses/<name of the bench>)")
-    parser.add_argument("--twin", default="actuator", metavar="NAME", help="machine the bench comes from (actuator)")
+    parser.add_argument(
+        "--twin",
+        default="actuator",
+        metavar="NAME",
+        help="machine the bench comes from, or a Python file that states one",
+    )
     parser.add_argument(
         "--exclude", nargs="+", default=[], metavar="EFFECT", help="effects to leave out of the library"
     )
@@ -24,8 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--by",
         choices=("simulation", "equations"),
-        help="by the equations at the measured signals, or against simulated recordings, the only way for a measured "
-        "machine (equations)",
+        help="by the equations at the measured signals, or the older way, against simulated recordings (equations)",
     )
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
@@ -41,6 +45,7 @@ def run(args: argparse.Namespace) -> None:
     from ..equations.run import diagnose_folder
     from ..errors import InputError
     from ..gap.run import diagnose_path
+    from ..machines.run import diagnose_file
 
     target = None
     if args.experiment:
@@ -49,11 +54,13 @@ def run(args: argparse.Namespace) -> None:
         target = config.CONF / "experiment" / f"{args.experiment}.yaml"
     spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
     tracking = not args.no_tracking
-    by = args.by or ("equations" if args.twin == "actuator" else "simulation")
-    if by == "equations":
-        if args.twin != "actuator":
-            raise InputError(f"--by equations: the twin '{args.twin}' has none; accepted is --by simulation")
+    by = args.by or "equations"
+    if by == "equations" and args.twin == "actuator":
         diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking)
+    elif by == "equations":
+        if target is not None:
+            raise InputError("--experiment: a measured machine has no simulator that could run one")
+        diagnose_file(args.path, args.twin, spec, args.out, args.exclude, tracking)
     else:
         diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
     if target is not None:

@@ -53,13 +53,17 @@ class Bench:
     processes : in which recordings are linearised side by side
     """
 
+    searching: type[Search] = Search
+    reaches = REACH
+    settled = SETTLED
+
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         self.machine, self.recordings, self.processes = machine, list(recordings), processes
         self.parameters: dict[str, Parameter] = dict(machine.parameters)
         self.units: list[Unit] = list(machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()}
         self.on: set[str] = set()
-        self.reach = REACH[1]
+        self.reach = self.reaches[1]
         self.carried: dict[str, Carried] = {}
         of_unit = {p.name for u in self.units for p in u.parameters}
         mine = set(self.recordings)
@@ -380,10 +384,10 @@ class Bench:
         if begun is None:
             # the unit first: its nuisances move the point before anything is compared, but not to where only a cause
             # that is missing would have them
-            self.reach = REACH[0]
+            self.reach = self.reaches[0]
             self.settle(NOTHING)
             whites, normal = self._renewed()
-            self.reach = REACH[1]
+            self.reach = self.reaches[1]
             if self._carry_own_forms(self._search(normal, False)):
                 whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
@@ -434,7 +438,7 @@ class Bench:
         units, candidates = self.candidates(reduced)
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
-        search = Search(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
+        search = self.searching(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
         search.run()
         return search
 
@@ -453,7 +457,7 @@ class Bench:
         """
         if normal is not None:
             on = set(self.on)
-            if self.move(model, normal)[1] < SETTLED:
+            if self.move(model, normal)[1] < self.settled:
                 return model
             if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
                 # a secant points the way only: its effect finds its place before anything undescribed takes it
@@ -462,7 +466,7 @@ class Bench:
         for _ in range(steps):
             # on its way a set may be led by a little bias, where it ends it must not
             found, at_point = self._fitted(model, corrected=False)
-            if self.move(found, at_point)[1] < SETTLED:
+            if self.move(found, at_point)[1] < self.settled:
                 break
         found, at_point = self._fitted(model)
         self.move(found, at_point)
@@ -477,7 +481,7 @@ class Bench:
         this = replace(model, choices=choices)
         at_point = self.normal(self.linearise(this, corrected=corrected), this)
         reduced = self.reduce(at_point)
-        search = Search(reduced, *self.candidates(reduced))
+        search = self.searching(reduced, *self.candidates(reduced))
         width = {
             (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
             for c in choices

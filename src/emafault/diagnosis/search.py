@@ -69,6 +69,8 @@ class Candidate:
 class Search:
     """Beam search with additions, removals and swaps over a linearised model."""
 
+    size_prior: tuple[float, ...] = SIZE_PRIOR
+
     def __init__(
         self,
         reduced: Reduced,
@@ -194,9 +196,9 @@ class Search:
         forms, left = kinds.count("form"), kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
         own = sum(v >= OTHER_FORM for _, v in members)
-        if listed >= len(SIZE_PRIOR) or forms >= len(FORM_PRIOR):
+        if listed >= len(self.size_prior) or forms >= len(FORM_PRIOR):
             return -np.inf
-        value = np.log(SIZE_PRIOR[listed]) - _log_choose(n_listed, listed)
+        value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
         value += own * np.log(OTHER_FORM_PRIOR) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)

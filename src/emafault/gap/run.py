@@ -1,7 +1,5 @@
 """A whole diagnosis: recordings in; verdict, report, experiment and tracking out."""
 
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,14 +11,13 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..effects import EFFECTS
 from ..errors import InputError
-from ..progress import say
 from ..recording import Recording, replace_atomically
+from ..written import EXPERIMENT, REPORT, VERDICT, file_name, log_diagnosis, results_folder, to_json
 from .bench import Bench, read_bench, split_bench
 from .decide import Calibration
 from .diagnose import Diagnosis, diagnose
 from .words import summary
 
-VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
 THREADS = 2
 RIVALS = 5  # sets that are put on the confirm recordings
 
@@ -98,12 +95,6 @@ def diagnose_path(
         for case, found in cases.items():
             log_diagnosis(spec["tracking"], folders[case], found.verdict)
     return {case: found.verdict for case, found in cases.items()}
-
-
-def results_folder() -> Path:
-    """``results`` here, else the project's."""
-    here = Path("results")
-    return here if here.is_dir() else Path(__file__).resolve().parents[3] / "results"
 
 
 # --- the two kinds of machine ----------------------------------------------------------------------------------------
@@ -236,33 +227,8 @@ def write_pages(folder: Path, found: Diagnosed) -> None:
     write_report(found.diagnosis, folder / REPORT, found.truths, found.region, retrained, found.labels)
 
 
-def to_json(value: Any) -> str:
-    """Plain JSON; numbers that JSON has not (NaN, infinity) become null."""
-    return json.dumps(_plain(value), indent=1, allow_nan=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(v) for v in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value
-
-
 def _write(path: Path, text: str) -> None:
     replace_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-
-
-def file_name(text: str) -> str:
-    """Text as the name of a file and of an experiment."""
-    kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
-    return kept.lstrip("_-") or "bench"
 
 
 def _write_contents(folder: Path, name: str, cases: Sequence[str]) -> None:
@@ -272,35 +238,3 @@ def _write_contents(folder: Path, name: str, cases: Sequence[str]) -> None:
     links = "".join(f'<li><a href="{file_name(c)}/{REPORT}">{c}</a></li>' for c in cases)
     page.parts.append(f"<ul>{links}</ul>")
     page.write(folder / REPORT)
-
-
-def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
-    """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
-    from ..tracking import Entry, log_run
-
-    first = verdict["which"][0]
-    metrics = {"probability": first["probability"]}
-    for kind, rung in verdict["shrinks"].items():
-        metrics |= {f"{kind}.{k}": v for k, v in (rung or {}).items() if v is not None}
-    for name, p in first.get("parameters", {}).items():
-        metrics[f"parameter.{name}"] = p["value"]
-    entry = Entry(
-        verdict["bench"],
-        parameters={
-            "verdict": verdict["verdict"],
-            "effects": "+".join(first["effects"]) or "no_gap",
-            "twin": verdict["twin"],
-            "recordings": verdict["recordings"],
-            "digest": verdict["digest"],
-        },
-        metrics=metrics,
-        tags={"stage": "diagnosis", "bench": verdict["bench"]},
-        files={str(folder / name): "" for name in (VERDICT, REPORT)},
-    )
-    try:
-        uri = tracking["uri"]
-        if uri.startswith("sqlite:///results/"):
-            uri = f"sqlite:///{results_folder() / uri.removeprefix('sqlite:///results/')}"
-        log_run(uri, tracking["experiment"], entry)
-    except Exception as error:
-        say(f"not tracked: {' '.join(str(error).split())[:200]}")

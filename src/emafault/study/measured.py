@@ -97,15 +97,20 @@ def draw_page(
     )
     rows = [summary(f"{name.split('/')[0]}: {c}", d.verdict) for name, cases in found.items() for c, d in cases.items()]
     page.table(HEADER, rows)
-    if withheld:
-        page.heading("Known distortions, and the strongest effect left out")
-        page.table(
-            ("twin", "case", "what", "verdict", "named", "remainder in", "right"),
-            [
-                [r.twin, r.case, r.what, r.verdict, ", ".join(r.named) or "-", r.placed, "yes" if r.right else "no"]
-                for r in withheld
-            ],
-        )
+    for title, left_out in (
+        ("Known distortions put in by hand", False),
+        ("The strongest effect left out: what counts as true is what the diagnosis itself named", True),
+    ):
+        rows_of = [r for r in withheld if r.what.startswith("left out") == left_out]
+        if rows_of:
+            page.heading(f"{title}: {sum(r.right for r in rows_of)} of {len(rows_of)} right")
+            page.table(
+                ("twin", "case", "what", "verdict", "named", "remainder in", "right"),
+                [
+                    [r.twin, r.case, r.what, r.verdict, ", ".join(r.named) or "-", r.placed, "yes" if r.right else "no"]
+                    for r in rows_of
+                ],
+            )
     for name, cases in found.items():
         for case, diagnosis in cases.items():
             _section(page, name, case, diagnosis, draw_residuals, draw_rivals)

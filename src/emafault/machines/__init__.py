@@ -1,0 +1,1 @@
+"""Measured machines: what each states of itself, and their diagnosis."""

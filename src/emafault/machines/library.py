@@ -1,0 +1,171 @@
+"""Measured machines by name, or as a file that states one, and the cases that recordings hold."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import util
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from ..errors import InputError
+from . import back_emf, dq_machine, friction_axis, induction_currents, propeller_sweep, six_step_bus, slow_rotation
+from .statement import COORDINATES, EQUATIONS, Arrays, Distortion, Machine, told
+
+_MODULES: dict[str, ModuleType] = {
+    "dq_machine": dq_machine,
+    "six_step_bus": six_step_bus,
+    "propeller_sweep": propeller_sweep,
+    "back_emf": back_emf,
+    "slow_rotation": slow_rotation,
+    "friction_axis": friction_axis,
+    "induction_currents": induction_currents,
+}
+MEASURED = tuple(_MODULES)
+NEEDED = ("read", "build")
+ACCEPTED = "accepted is a Python file with read(path) -> {case: arrays} and build(case, arrays) -> Machine"
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A kind of machine: how its recordings are read, and what it states of each."""
+
+    name: str
+    read: Callable[[Path], Mapping[str, Arrays]]
+    build: Callable[[str, Arrays], Machine]
+    distortions: Sequence[Distortion] = ()
+
+
+def stated(name: str) -> Stated:
+    """The machine of this name, or of this Python file.
+
+    Raises
+    ------
+    InputError
+        when there is none, or the file states none.
+    """
+    if name in MEASURED:
+        return _of(name, _MODULES[name])
+    if not name.endswith(".py"):
+        raise InputError(
+            f"--twin: got '{name}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"
+        )
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; {ACCEPTED}")
+    spec = util.spec_from_file_location(f"emafault_machine_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as problem:  # whatever a user's file does wrong
+        raise InputError(f"{path}: {type(problem).__name__}: {' '.join(str(problem).split())}; {ACCEPTED}") from None
+    for needed in NEEDED:
+        if not callable(getattr(module, needed, None)):
+            raise InputError(f"{path}: has no function '{needed}'; {ACCEPTED}")
+    return _of(path.stem, module)
+
+
+def _of(name: str, module: ModuleType) -> Stated:
+    distortions = getattr(module, "distortions", None)
+    return Stated(name, module.read, module.build, tuple(distortions()) if distortions else ())
+
+
+def read_cases(machine: Stated, path: Path) -> dict[str, Arrays]:
+    """Raw arrays of each case (machine or condition) of a file, or of the files of a folder that the machine reads.
+
+    Raises
+    ------
+    InputError
+        when the file is not what the machine needs, or no file of the folder is.
+    """
+    path = Path(path)
+    if path.is_file():
+        return dict(_guarded(machine, "read", path))
+    if not path.is_dir():
+        raise InputError(f"{path}: no such file or folder")
+    cases: dict[str, Arrays] = {}
+    refused = ""
+    for file in sorted(path.iterdir()):
+        if not file.is_file() or (machine.name in MEASURED and not file.name.endswith((".npz", ".csv", ".csv.gz"))):
+            continue
+        try:
+            found = _guarded(machine, "read", file)
+        except InputError as problem:
+            refused = refused or str(problem)
+            continue
+        cases |= {case if case not in cases else f"{file.name}: {case}": arrays for case, arrays in found.items()}
+    if not cases:
+        raise InputError(f"{path}: no file that twin {machine.name!r} reads" + (f" ({refused})" if refused else ""))
+    return cases
+
+
+def build(machine: Stated, case: str, arrays: Arrays) -> Machine:
+    """The machine of one case, checked.
+
+    Raises
+    ------
+    InputError
+        when the arrays hold too little, or what is stated does not fit together.
+    """
+    found = _guarded(machine, "build", case, arrays)
+    if not isinstance(found, Machine):
+        raise InputError(f"{machine.name}: build gives a {type(found).__name__}, accepted is a Machine")
+    problem = flaw(found)
+    if problem:
+        raise InputError(f"{machine.name}: {problem}")
+    return found
+
+
+def flaw(machine: Machine) -> str:
+    """What does not fit together in a machine's statement; empty where all does."""
+    recordings = {r.recording for r in machine.rows}
+    for name in (*machine.explore, *machine.confirm):
+        if name not in recordings:
+            return f"recording '{name}' has no rows; those that have are {', '.join(sorted(recordings))}"
+    if not machine.explore:
+        return "no recording explores"
+    names = [p.name for p in machine.parameters]
+    twice = [n for n in names if names.count(n) > 1]
+    if twice:
+        return f"parameter '{twice[0]}' is stated twice"
+    for effect in machine.effects:
+        mine = [p.name for p in machine.parameters if p.effect == effect.id]
+        if not mine:
+            return f"effect '{effect.id}' has no parameter"
+        for shape in effect.shapes:
+            if not set(shape) <= set(mine):
+                return (
+                    f"effect '{effect.id}': a shape names {', '.join(sorted(set(shape) - set(mine)))}, which it has not"
+                )
+    beside: dict[tuple[str, str], set[str]] = {}
+    for rows in machine.rows:
+        if rows.equation not in machine.equations:
+            return f"rows of '{rows.equation}', accepted are the equations {', '.join(machine.equations)}"
+        if told(rows.equation) not in EQUATIONS:
+            return f"equation '{rows.equation}', accepted are {', '.join(EQUATIONS)} and parts of one, as torque_front"
+        if rows.along not in COORDINATES:
+            return f"rows of {rows.equation} lie along '{rows.along}', accepted are {', '.join(COORDINATES)}"
+        sizes = {len(rows.observed), len(rows.variance), len(rows.low), len(rows.high)}
+        if len(sizes) > 1:
+            return f"rows of {rows.equation} in '{rows.recording}': observed, variance, low and high differ in length"
+        if not np.isfinite(rows.observed).all():
+            return f"rows of {rows.equation} in '{rows.recording}': a measured value is not a finite number"
+        if set(rows.beside) != beside.setdefault((rows.equation, rows.along), set(rows.beside)):
+            return f"rows of {rows.equation} in '{rows.recording}': 'beside' names other coordinates than elsewhere"
+        if not min(rows.variance, default=1.0) > 0.0:
+            return f"rows of {rows.equation} in '{rows.recording}': a variance is not positive"
+    return ""
+
+
+def _guarded(machine: Stated, what: str, *arguments):
+    """What a machine's function gives; whatever goes wrong in a file of the user's is one line."""
+    try:
+        return getattr(machine, what)(*arguments)
+    except InputError:
+        raise
+    except Exception as problem:
+        if machine.name in MEASURED:
+            raise
+        text = " ".join(str(problem).split())
+        raise InputError(f"{machine.name}.{what}: {type(problem).__name__}: {text}") from None

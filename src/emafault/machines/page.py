@@ -1,0 +1,143 @@
+"""The page of a measured machine's diagnosis, and what was found in sentences."""
+
+import html
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..figures import gap as figures
+from ..figures.machines import Panel, draw_residuals
+from ..figures.page import Page
+from .diagnose import Diagnosed
+
+MOST = 8  # sets in the table
+TOLD = 6  # parameters in a sentence
+OPEN = 0.05  # probability from which an effect that is not named is worth a line
+
+
+def finding(verdict: Mapping[str, Any]) -> list[str]:
+    """What was found, a sentence each."""
+    first, kind = verdict["which"][0], verdict["verdict"]
+    out = []
+    sure = [e for e, p in verdict["inclusion"].items() if p >= 0.9]
+    if kind in ("explained", "partly", "group") and sure:
+        names = ", ".join(sure).replace("_", " ")
+        fitted = {n: p for n, p in first.get("parameters", {}).items() if p["effect"] in sure}
+        sizes = f": {_fitted(fitted)}" if 0 < len(fitted) <= TOLD else ""  # the table has them all
+        out.append(f"{names[0].upper()}{names[1:]}{sizes}.")
+    for group in verdict["groups"]:
+        out.append(f"One of a group that these recordings cannot tell apart: {_words(group)}.")
+    if kind == "no_gap":
+        out.append(f"The base model accounts for these recordings (probability {first['probability']:.3g}).")
+    if kind == "unknown":
+        out.append(
+            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
+            "reaches a probability of 0.9."
+        )
+    out += [d["sentence"] for d in verdict["discovered"]]
+    held, signal = verdict["held_out"], verdict["shrinks"]["signal"]
+    if signal and signal["closed"] is not None and kind != "no_gap":
+        share = 100 * signal["closed"]
+        said = f"closes {share:.0f} % of the gap" if share > 0.5 else "leaves all of the gap, or more"
+        out.append(f"On recordings not looked at before, what was sealed {said}.")
+    if held["outcome"] in ("contradicted", "rival"):
+        out.append("The recordings set aside changed what is claimed: the seal says what was found before.")
+    return out
+
+
+def cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
+    """What is left open: groups, effects neither named nor ruled out, effects that leave no trace here."""
+    out = [f"{_words(g)}: one of them acts" for g in verdict["groups"]]
+    grouped = {e for g in verdict["groups"] for e in g}
+    for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
+        if OPEN < p < 0.9 and effect not in grouped:
+            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+    if verdict["untold"]:
+        out.append(f"of {', '.join(verdict['untold']).replace('_', ' ')} these recordings say nothing")
+    return out or ["No listed effect is left between named and ruled out."]
+
+
+def draw(found: Diagnosed) -> Page:
+    """The page of one diagnosis."""
+    page = Page(f"Where model and machine {found.verdict['bench']} disagree")
+    for sentence in finding(found.verdict):
+        page.paragraph(sentence, "lead")
+    for note in found.verdict["notes"]:
+        page.paragraph(note, "small")
+    body(page, found, "")
+    page.heading("Sealed before the recordings set aside were opened")
+    page.parts.append(f"<pre>{html.escape(json.dumps(found.verdict['sealed'], indent=1))}</pre>")
+    return page
+
+
+def body(page: Page, found: Diagnosed, key: str) -> None:
+    """Tables and pictures of one diagnosis; ``key`` begins the names of its pictures."""
+    verdict = found.verdict
+    page.figure(
+        f"{key}residuals",
+        draw_residuals(panels(found)),
+        "Residuals before (grey) and with the leading set (blue); filled: explored, hollow: set aside.",
+    )
+    page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in cannot_tell(verdict)) + "</ul>")
+    rows = [
+        [" + ".join(e["effects"]).replace("_", " "), f"{e['probability']:.4f}", _fitted(e.get("parameters", {}))]
+        for e in verdict["which"][:MOST]
+        if e["probability"] > 0.0005 and e["effects"]
+    ]
+    if rows:
+        page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows)
+    rows = [
+        [w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}",
+         f"{w['z']:.3g}", f"{w['share']:.1%}"]
+        for w in verdict["where"]
+    ]  # fmt: skip
+    if rows:
+        page.table(["where", "along", "most of it lies at", "size over the noise", "share"], rows)
+    if verdict["shrinks"]["signal"]:
+        page.figure(
+            f"{key}how_far",
+            figures.draw_ladder(verdict["shrinks"]),
+            "Residual on the recordings set aside, everything frozen. Placebo: random signatures of equal freedom.",
+        )
+    base = verdict["base"]
+    if base:
+        rows = [
+            [n, *(f"{b[s]['value']:.4g} ({b[s]['low']:.4g} to {b[s]['high']:.4g})" for s in ("before", "after")),
+             b["after"]["units"]]
+            for n, b in base.items()
+        ]  # fmt: skip
+        page.table(["base model", "without", "with the leading set", "unit"], rows)
+    rows = [
+        [e["command"], _words(e["separates"], " from ").replace("+", " + "), f"{e['expected_odds']:.3g}"]
+        for e in verdict["next_experiment"]
+    ]
+    if rows:
+        page.table(["to record next", "would tell", "expected odds"], rows)
+
+
+def panels(found: Diagnosed) -> list[Panel]:
+    """Residuals of every equation and recording, each row over its own standard deviation."""
+    whole, at = found.whole, found.whole.settled
+    out: list[Panel] = []
+    for rows in found.machine.rows:
+        deviation = np.sqrt(np.diag(rows.covariance))
+        general = [{n: v for n, v in p.items() if "@" not in n} for p in (whole.base(), at.values)]
+        before, after = (rows.observed - whole.recorded.predict(rows, general)) / deviation
+        place = 0.5 * (rows.low + rows.high)
+        along = found.machine.words.get(rows.along, rows.along)
+        out.append((rows.equation, along, place, before, after, rows.recording in found.machine.confirm))
+    return out
+
+
+def _words(names, between: str = " or ") -> str:
+    return between.join(names).replace("_", " ")
+
+
+def _fitted(parameters: Mapping[str, Any]) -> str:
+    parts = []
+    for name, p in parameters.items():
+        units = "" if p.get("units", "1") == "1" else f" {p['units']}"
+        parts.append(f"{name} = {p['value']:.4g}{units} ({p['low']:.4g} to {p['high']:.4g})")
+    return ", ".join(parts)
