@@ -298,14 +298,20 @@ class Bench:
                 out[unit.id, v] = plain
                 if len(own):
                     out[unit.id, v + OTHER_FORM] = replace(plain, extra=own, extra_sd=np.full(len(own), OWN_FORM))
-        for equation in dict.fromkeys(n.split(".")[1] for n in reduced.names if n.startswith("remainder.")):
-            index = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"remainder.{equation}.")])
-            unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])])
+        left: dict[str, tuple[list[int], list[int]]] = {}
+        for k, n in enumerate(reduced.names):
+            if n.startswith("remainder."):
+                left.setdefault(n.split(".")[1], ([], []))["@" in n].append(k)
+        for equation, kinds in left.items():
+            # the same in all recordings, or another in each
+            each = [np.array(k) for k in kinds if k]
+            unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])] * len(each))
             self.remainders.setdefault(unit.id, unit)
-            out[unit.id, 0] = Candidate(
-                index, np.zeros(len(index)), np.ones(len(index)), np.zeros(len(index), int), REMAINDER_SIZES,
-                [reduced.names[k] for k in index],
-            )  # fmt: skip
+            for v, index in enumerate(each):
+                out[unit.id, v] = Candidate(
+                    index, np.zeros(len(index)), np.ones(len(index)), np.zeros(len(index), int), REMAINDER_SIZES,
+                    [reduced.names[k] for k in index],
+                )  # fmt: skip
         return [*self.units, *self.remainders.values()], out
 
     def _tolerance(self, p: Parameter) -> float:

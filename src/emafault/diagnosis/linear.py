@@ -43,8 +43,8 @@ class White:
 
 
 def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.ndarray]]:
-    """Columns of an equation's undescribed remainder, ``size`` high: functions of each coordinate, and the equation's
-    own drivers with coefficients that change along them."""
+    """Columns of an equation's undescribed remainder, ``size`` high: functions of each coordinate, the equation's own
+    drivers with coefficients that change along them, and slow functions with coefficients of each recording's own."""
     drivers, phi = block.coordinates["drivers"], block.coordinates["phi"]
     names, columns = [], []
     for f, function in enumerate(phi):
@@ -54,6 +54,9 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
         for f in block.coordinates["slow"]:
             names.append(f"remainder.{block.equation}.{d}.{f}")
             columns.append(size * driver * phi[f])
+    for f in block.coordinates.get("each", ()):
+        names.append(f"remainder.{block.equation}.0.{f}@{block.recording}")
+        columns.append(size * phi[f])
     return names, columns
 
 

@@ -25,6 +25,7 @@ SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
+EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
 
@@ -306,6 +307,7 @@ class ReferenceActuator:
             "phi": np.array([of(f) for f in phi]),
             "drivers": np.array(rows),
             "slow": SLOW_FUNCTIONS,
+            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
         }
 
 
