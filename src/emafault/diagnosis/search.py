@@ -89,8 +89,10 @@ class Search:
         self.counts = listed, every.count("form"), every.count("remainder")
         flat = list(candidates.values())
         self.flat = (
-            np.cumsum([0, *(len(c.index) for c in flat)]), _joined([c.index for c in flat]).astype(int),
-            _joined([c.mean for c in flat]), _joined([c.sd for c in flat]),
+            np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
+            _joined([x for c in flat for x in (c.index, c.extra)]).astype(int),
+            _joined([x for c in flat for x in (c.mean, np.zeros(len(c.extra)))]),
+            _joined([x for c in flat for x in (c.sd, c.extra_sd)]),
         )  # fmt: skip
 
     # ---- one set
