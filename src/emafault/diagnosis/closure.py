@@ -1,34 +1,41 @@
 """How far the gap shrinks on recordings that took no part: the ladder of root mean squares of the whitened residual."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from .evidence import Reduced
+from .fit import Bench
 from .linear import White, assemble, compressed, white_rows
-from .linearisation import Carried
 
 STEPS = 1  # of a refit of what belongs to a recording alone
 PLACEBOS = 20
 
 
-def own(parameters: Sequence[str], recording: str) -> list[str]:
-    """Nuisances of one recording alone."""
-    return [n for n in parameters if n.endswith(f"@{recording}") and not n.startswith("controller.")]
-
-
 class Ladder:
-    """Confirm recordings under frozen models; each one's soak temperature and seeded fault are refitted."""
+    """Confirm recordings under frozen models; what belongs to each recording alone is refitted.
 
-    def __init__(self, machine, recordings: Sequence[str], parameters: Mapping, carried: Mapping[str, Carried]):
-        self.machine, self.recordings, self.parameters, self.carried = machine, list(recordings), parameters, carried
+    That is its soak temperature and seeded fault and what else of its nuisances is its own, but for its controller's
+    timing; of a form of the measuring chain only if the model has it.
+    """
 
-    def blocks(self, values: Mapping[str, float], remainders: bool = False) -> list[White]:
-        """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked."""
+    def __init__(self, bench: Bench, recordings: Sequence[str]):
+        self.machine, self.recordings = bench.machine, list(recordings)
+        self.parameters, self.carried = bench.parameters, bench.carried
+        self.nuisances = set(bench.nuisances)
+
+    def blocks(self, values: Mapping[str, float], remainders: bool = False, also: Collection[str] = ()) -> list[White]:
+        """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked.
+
+        ``also`` names parameters of the model, of which those of a recording are refitted too.
+        """
         out: list[White] = []
         for recording in self.recordings:
-            free = [n for n in own(list(self.parameters), recording) if n in values]
-            mine, weights = dict(values), self.carried[recording]
+            free = [
+                n for n in self.parameters
+                if n.endswith(f"@{recording}") and not n.startswith("controller.") and n in self.nuisances | set(also)
+            ]  # fmt: skip
+            mine, weights = {n: p.off for n, p in self.parameters.items()} | dict(values), self.carried[recording]
             for step in range(STEPS + 1):
                 last = step == STEPS
                 whites = [

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..recording import Recording
+from .held_out import held_to_account, values_at
 from .machine import FAULTS, ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import told
@@ -103,9 +104,13 @@ def diagnose(
     whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
-    final = read(all_fit.models, all_fit.search.units.values(), tuple(whole.observed()))
-    ladder = Ladder(whole, confirm, every.parameters, all_fit.carried)
-    return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit), recordings, own)
+    units, observed = all_fit.search.units.values(), tuple(whole.observed())
+    ladder = Ladder(every, confirm)
+    named = read(all_fit.models, units, observed).named
+    models, ratios = held_to_account(all_fit.models, named, ladder, bench, fit)
+    all_fit = replace(all_fit, models=models)
+    final = read(models, units, observed)
+    return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios), recordings, own)
 
 
 def _seal(reading: Reading) -> dict[str, Any]:
@@ -142,7 +147,7 @@ def _diagnosed(
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
-    after_values = _values(bench, fit, best)
+    after_values = values_at(bench, fit, best)
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
@@ -154,6 +159,8 @@ def _diagnosed(
     ]
     before = _simulator(bench, before_point, ())
     verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if fitted else before}
+    if held_out is not None:
+        verdict["held_out"] = {e: round(r, 3) for e, r in held_out[3].items()}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
     return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)
@@ -319,15 +326,6 @@ def _null(bench: Bench) -> Bench:
     return null
 
 
-def _values(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
-    """All values at a model's fit, the nuisances with it."""
-    kept = dict(bench.point), set(bench.on)
-    bench.settle(model, fit.normal)
-    out = bench.values()
-    bench.point, bench.on = kept
-    return out
-
-
 def _spreads(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
     """Posterior standard deviations of the nuisances with a model's own parameters free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
@@ -370,18 +368,18 @@ def _shrinks(
     """The ladder on the confirm recordings; enters what each described form closes alone."""
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
-    ladder, explored, fit = held_out
+    ladder, explored, fit, _ = held_out
     reading = read(fit.models, fit.search.units.values())
     told = reading.named or reading.forms or reading.groups
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
     null = _null(explored)
     recalibrated = {**off, **null.values()}
-    after = {**recalibrated, **_values(explored, fit, model)} if told else recalibrated
+    after = {**recalibrated, **values_at(explored, fit, model)} if told else recalibrated
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
-    best = ladder.blocks(after)
     mine = [n for n in model.deviations if is_parameter(n)] if told else []
+    best = ladder.blocks(after, also=mine)
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
@@ -394,8 +392,8 @@ def _shrinks(
     for entry in found:
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
-            alone = {**recalibrated, **{p.name: after[p.name] for p in form.parameters}}
-            entry["closed"] = closed(rms(base), rms(ladder.blocks(alone)), 1.0, count)
+            own = {p.name: after[p.name] for p in form.parameters}
+            entry["closed"] = closed(rms(base), rms(ladder.blocks(recalibrated | own, also=list(own))), 1.0, count)
     return {"signal": signal, "features": None, "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings)}
 
 
