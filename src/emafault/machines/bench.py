@@ -15,6 +15,7 @@ SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # of a remainder over th
 SETTLED, SETTLING = 1e-3, 10  # log evidence that one more step of a set may still promise, and most steps
 ROUNDS, FINALISTS = 3, 6  # sets that are taken to their own optimum, and how often
 NEAR, CLOSE = 12.0, 0.5  # log posterior within which a set is one of them, and by which it must be better
+CARRYING = 5  # effects that carry their own form
 UNSEEN = 1.0  # information over that of the prior, below which rows say nothing of an effect
 
 
@@ -49,6 +50,7 @@ class MeasuredBench(Bench):
     searching = MeasuredSearch
     reaches = (np.inf, np.inf)  # priors are as wide as the signals allow
     settled = SETTLED
+    early = False  # a gain of an instrument in another form is any of the others
 
     def linearise(self, model=None, renew=False, known=(), corrected=True):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
@@ -104,6 +106,17 @@ class MeasuredBench(Bench):
         for n, (low, high) in self.machine.bounds.items():
             self.point[n] = float(np.clip(self.point[n], low, high))
         return steps
+
+    def _carry_own_forms(self, search: Search) -> bool:
+        """See ``Bench``: effects of good sets alone."""
+        chosen: dict[str, dict[str, float]] = {}
+        for model in search.ranked():
+            for choice in model.choices:
+                if len(chosen) < CARRYING and self._kind(choice.unit) == "structural" and choice.unit not in chosen:
+                    names = self.names_of(choice)
+                    chosen[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
+        self.sizes = chosen
+        return bool(chosen)
 
     def own_forms(self) -> dict[str, dict[str, float]]:
         """Sizes from off, by column, of the units that carry their own form."""
