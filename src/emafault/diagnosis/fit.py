@@ -56,7 +56,6 @@ class Bench:
     searching: type[Search] = Search
     reaches = REACH
     settled = SETTLED
-    early = True  # whether what explains most alone carries its own form from the first search
 
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         self.machine, self.recordings, self.processes = machine, list(recordings), processes
@@ -395,8 +394,6 @@ class Bench:
             self.settle(NOTHING)
             whites, normal = self._renewed()
             self.reach = self.reaches[1]
-            if self.early and self._carry_own_forms(self._search(normal, False)):
-                whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, normal, FIRST, False)
             if self._carry_own_forms(search):

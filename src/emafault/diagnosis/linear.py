@@ -63,12 +63,17 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
 def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
     """What a unit of these amounts adds to a block, times functions of the coordinates: its form where that is not the
     library's."""
-    parts = [amount * np.asarray(block.columns[n]) for n, amount in amounts.items() if n in block.columns]
-    added = np.broadcast_to(sum(parts, np.zeros(1)), len(block.residual))
+    added = _added(block, amounts)
     if np.sum(added[block.usable] ** 2 / block.bands[0][block.usable]) < SEEN:
         return [], []
     phi = block.coordinates["phi"][OWN]
     return [f"own.{unit}.{block.equation}.{f}" for f in range(len(phi))], [added * f for f in phi]
+
+
+def _added(block: Block, amounts: Mapping[str, float]) -> np.ndarray:
+    """What amounts of parameters add to a block (row,)."""
+    parts = [amount * np.asarray(block.columns[n]) for n, amount in amounts.items() if n in block.columns]
+    return np.broadcast_to(sum(parts, np.zeros(1)), len(block.residual))
 
 
 def white_rows(
@@ -108,7 +113,13 @@ def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
     return rows if weights is None else filtered(rows, weights.usable, weights.coefficients, weights.variance)
 
 
-def correct(white: White, block: Block, disturbed: Block, weights: Weights | None) -> None:
+def correct(
+    white: White,
+    block: Block,
+    disturbed: Block,
+    weights: Weights | None,
+    own: Mapping[str, Mapping[str, float]] | None = None,
+) -> None:
     """Take out of a normal matrix what the noise in the regressors adds to it, in place.
 
     To the first order a second draw of the noise changes the columns and the residual as the first did; the products
@@ -119,6 +130,13 @@ def correct(white: White, block: Block, disturbed: Block, weights: Weights | Non
     changes = {
         k: disturbed.columns.get(n, 0.0) - block.columns[n] for k, n in enumerate(white.names) if n in block.columns
     }
+    index = {n: k for k, n in enumerate(white.names)}
+    for unit, amounts in (own or {}).items():  # an own form has the noise of what it is a form of
+        more = _added(disturbed, amounts) - _added(block, amounts)
+        for f, function in enumerate(block.coordinates["phi"][OWN]):
+            name = f"own.{unit}.{block.equation}.{f}"
+            if name in index:
+                changes[index[name]] = more * function
     changes[last] = disturbed.residual - block.residual
     changed = [k for k, change in changes.items() if np.any(change)]
     raw = columns_of([changes[k] for k in changed], len(block.residual))
@@ -127,10 +145,10 @@ def correct(white: White, block: Block, disturbed: Block, weights: Weights | Non
     power = np.diag(white.gram)[changed]
     most = np.where(np.array(changed) == last, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
     rows *= np.minimum(1.0, most)
-    own = white.gram[-1, -1]  # the same for all hypotheses
+    misfit = white.gram[-1, -1]  # the same for all hypotheses
     white.gram[np.ix_(changed, changed)] -= rows.T @ rows
-    white.own = own - float(white.gram[-1, -1])
-    white.gram[-1, -1] = own
+    white.own = misfit - float(white.gram[-1, -1])
+    white.gram[-1, -1] = misfit
     white.gram = _definite(white.gram)
 
 

@@ -52,7 +52,8 @@ class Linearisation:
         if task.corrected:
             disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=set(task.wanted))
             for white, block, other in zip(out, blocks, disturbed, strict=True):
-                correct(white, block, other, weights.get(block.equation))
+                own = task.own if block.equation not in SETTINGS else None
+                correct(white, block, other, weights.get(block.equation), own)
         return out, weights
 
     def _white(self, task: Task, recording: str) -> Parts:

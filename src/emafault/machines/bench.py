@@ -50,7 +50,6 @@ class MeasuredBench(Bench):
     searching = MeasuredSearch
     reaches = (np.inf, np.inf)  # priors are as wide as the signals allow
     settled = SETTLED
-    early = False  # a gain of an instrument in another form is any of the others
 
     def linearise(self, model=None, renew=False, known=(), corrected=True):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
