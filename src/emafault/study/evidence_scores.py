@@ -80,7 +80,8 @@ def reliability(rows: Sequence[Mapping[str, Any]], arm: str) -> dict[str, Any]:
     -------
     ``bins`` with ``mean`` probability, ``share`` on, ``count`` and half width ``band``; ``z`` by kind of unit, the sum
     over draws of what is on less what is expected, over its standard deviation from draw to draw; ``named`` shares of
-    listed effects with 0.9 or more; ``brier`` and ``log_score`` (nat) a draw
+    listed effects with 0.9 or more, and how many of the wrong are in draws whose true set the search missed; ``brier``
+    and ``log_score`` (nat) a draw
     """
     units = list(dict.fromkeys(u for r in rows for u in r["units"]))
     place = {u: k for k, u in enumerate(units)}
@@ -114,6 +115,8 @@ def reliability(rows: Sequence[Mapping[str, Any]], arm: str) -> dict[str, Any]:
         "named": {
             "count": int(named.sum()), "mean": float(p[named].mean()) if named.any() else None,
             "share": float(on[named].mean()) if named.any() else None,
+            "wrong": int((1.0 - on[named]).sum()),
+            "wrong_where_missed": int(((1.0 - on) * named)[[bool(r["missed"]) for r in rows]].sum()),
         },
         "brier": float(((p - on) ** 2).sum(axis=1).mean()),
         "log_score": float(-(on * np.log(clipped) + (1.0 - on) * np.log(1.0 - clipped)).sum(axis=1).mean()),
