@@ -13,6 +13,7 @@ EDGES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 1.0)  # of inc
 LEVELS = 50  # of the curve of coverage
 TINY = 1e-4  # smallest probability that the logarithmic score believes
 NAMED = 0.9
+SURE = 0.97
 KINDS = ("listed", "form", "remainder")
 
 
@@ -80,8 +81,8 @@ def reliability(rows: Sequence[Mapping[str, Any]], arm: str) -> dict[str, Any]:
     -------
     ``bins`` with ``mean`` probability, ``share`` on, ``count`` and half width ``band``; ``z`` by kind of unit, the sum
     over draws of what is on less what is expected, over its standard deviation from draw to draw; ``named`` shares of
-    listed effects with 0.9 or more, and how many of the wrong are in draws whose true set the search missed; ``brier``
-    and ``log_score`` (nat) a draw
+    listed effects with 0.9 or more, and how many of the wrong are in draws whose true set the search missed; ``sure``
+    the same of everything with 0.97 or more; ``brier`` and ``log_score`` (nat) a draw
     """
     units = list(dict.fromkeys(u for r in rows for u in r["units"]))
     place = {u: k for k, u in enumerate(units)}
@@ -115,12 +116,18 @@ def reliability(rows: Sequence[Mapping[str, Any]], arm: str) -> dict[str, Any]:
         "named": {
             "count": int(named.sum()), "mean": float(p[named].mean()) if named.any() else None,
             "share": float(on[named].mean()) if named.any() else None,
-            "wrong": int((1.0 - on[named]).sum()),
-            "wrong_where_missed": int(((1.0 - on) * named)[[bool(r["missed"]) for r in rows]].sum()),
+            **_wrong(rows, named, on),
         },
+        "sure": {"count": int((p >= SURE).sum()), **_wrong(rows, p >= SURE, on)},
         "brier": float(((p - on) ** 2).sum(axis=1).mean()),
         "log_score": float(-(on * np.log(clipped) + (1.0 - on) * np.log(1.0 - clipped)).sum(axis=1).mean()),
     }  # fmt: skip
+
+
+def _wrong(rows: Sequence[Mapping[str, Any]], told: np.ndarray, on: np.ndarray) -> dict[str, int]:
+    """How much of what is ``told`` (draw, unit) is not on, and how much of that in draws that the search missed."""
+    wrong = (told & (on == 0.0)).sum(axis=1)
+    return {"wrong": int(wrong.sum()), "wrong_where_missed": int(wrong[[bool(r["missed"]) for r in rows]].sum())}
 
 
 def _kind(unit: str) -> str:
