@@ -17,6 +17,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/measured.smk"
 include: "workflow/rules/gap.smk"
 include: "workflow/rules/withheld.smk"
+include: "workflow/rules/evidence.smk"
 
 
 # The default target: everything that one experiment, or one study with its variants, results in.

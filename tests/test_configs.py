@@ -1,6 +1,7 @@
 """Every experiment composes; what does not fit is refused in one line naming key, value and what is accepted."""
 
 import pytest
+from omegaconf import OmegaConf
 
 from emafault import config, provenance
 from emafault.errors import InputError
@@ -185,3 +186,23 @@ def test_a_draw_that_is_the_same_as_another_has_its_cases():
     one, other = (config.withheld_spec(draw, "T7", 1) for draw in ("standard", "standard_by_simulation"))
     assert one | {"by": "simulation"} == other
     assert len(one["seeds"]["told"]) == 0 and len(config.withheld_spec("standard", "T1", 0)["seeds"]["told"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"draws": 5}, r"evidence.draws: got 5, accepted is an integer from 20"),
+        ({"samples": 100}, r"evidence.samples: got 100, accepted is one less than a multiple of 20"),
+        ({"benches": [-1]}, r"evidence.benches\[0\]: got -1"),
+        ({"benches": []}, r"evidence.benches: got \[\]"),
+        ({"sed": 1}, r"evidence.sed.*did you mean seed"),
+    ],
+)
+def test_settings_of_the_check_of_the_evidence_are_checked(wrong, says, tmp_path, monkeypatch):
+    read = OmegaConf.load(config.CONF / "evidence.yaml")
+    OmegaConf.save(OmegaConf.merge(read, wrong), tmp_path / "evidence.yaml")
+    spec = config.evidence_spec()
+    assert spec["evidence"]["draws"] == 500 and set(spec) == {"actuator", "evidence", "sensors"}
+    monkeypatch.setattr(config, "CONF", tmp_path)
+    with pytest.raises(InputError, match=says):
+        config._evidence()

@@ -216,3 +216,13 @@ def test_the_withheld_check_makes_diagnoses_and_scores_blind_cases(house):
     assert (folder / "scoreboard.html").stat().st_size > 10_000
     # the recordings are gone once diagnosed, and the keys never stood beside them
     assert not list(folder.rglob("recording_*.nc"))
+
+
+def test_the_check_of_the_evidence_leaves_its_page(house):
+    settings = house / "conf" / "evidence.yaml"
+    settings.write_text(settings.read_text().replace("draws: 500", "draws: 20"))
+    run = _snakemake(house, "evidence", *SMOKE)
+    assert run.returncode == 0, run.stderr[-2000:]
+    folder = house / "results" / "evidence"
+    assert json.loads((folder / "scores.json").read_text())["library"]["draws"] == 20
+    assert 'id="library_ranks"' in (folder / "report.html").read_text()

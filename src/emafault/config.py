@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CONF = ROOT / "conf"
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
+RANK_BINS = 20  # of the ranks of the check of the evidence
 #: what a dataset is for -> its place in the sequence of seeds
 PARTS = {"training": 0, "fresh": 1, "reference": 2}
 
@@ -397,6 +398,27 @@ def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
     return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds, "by": read["by"]})
 
 
+def _evidence() -> dict[str, Any]:
+    """The settings of conf/evidence.yaml.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    read: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(CONF / "evidence.yaml"))  # type: ignore[assignment]
+    schema.check(read, schema.Evidence, "evidence")
+    if not read["benches"]:
+        schema.refuse("evidence.benches", read["benches"], "a list of one seed or more")
+    if (read["samples"] + 1) % RANK_BINS:
+        schema.refuse("evidence.samples", read["samples"], f"one less than a multiple of {RANK_BINS}")
+    return read
+
+
+def evidence_spec() -> dict[str, Any]:
+    """What the check of the evidence reads: its own settings, the actuator and the sensors."""
+    return recursively_sorted(_pick(compose(), "actuator", "sensors") | {"evidence": _evidence()})
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.
@@ -443,6 +465,7 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     InputError : as ``compose``; also one dataset name composed in two ways, or draws of blind cases that share one
     """
     check_draws()
+    _evidence()
     texts = split_overrides(overrides)
     top = compose(experiment, texts)
     if top["variants"]:

@@ -169,6 +169,15 @@ class Evaluation:
 
 
 @dataclass
+class Evidence:
+    draws: int = number(20, 100_000)
+    samples: int = number(19, 9_999)
+    seed: int = number(0, 2**31)
+    benches: list[int] = number(0, 2**31)
+    recordings: int = number(1, 8)
+
+
+@dataclass
 class Tracking:
     uri: str = choice()
     experiment: str = choice()
