@@ -8,6 +8,8 @@ PARAMETERS = {"d_cos": (0.0, 0.0, 0.025), "d_sin": (0.0, 0.0, 0.025)}
 
 def coefficient(p, rec, j):
     """Factor of k_j."""
+    if not any(x.value or x.slopes for x in (p("d_cos"), p("d_sin"))):
+        return 1.0
     return 1.0 + p("d_cos") * np.cos(rec.middle - rec.axis[j]) + p("d_sin") * np.sin(rec.middle - rec.axis[j])
 
 
