@@ -21,8 +21,12 @@ STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 def rows_of(state: State, j: int) -> np.ndarray:
     """Intervals in which an edge of phase j may lie."""
-    low, high, _ = _sweep(state.rec.rows_from, j)
     rec = state.rec.rows_from
+    return rec.once(("rows_of", j), lambda: _rows_of(rec, j))
+
+
+def _rows_of(rec, j: int) -> np.ndarray:
+    low, high, _ = _sweep(rec, j)
     half = high - low < np.pi / 3.0
     a = rec.actuator
     passing = 2.0 * a.inductance * np.abs(rec.current[:, STAYS[j]]) / a.bus_voltage  # s, about
@@ -62,7 +66,7 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     """Intervals of phase j, their ends from the nominal edge, and where the current passes over (electrical rad)."""
     rec, p = state.rec, state.p
     rows = rows_of(state, j)
-    low, high, _ = (x[rows] for x in _sweep(rec, j))
+    low, high = rec.once(("ends", j), lambda: tuple(x[rows] for x in _sweep(rec, j)[:2]))
     early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)

@@ -243,10 +243,8 @@ class ReferenceActuator:
                         continue  # at a point where the effect is on, its own derivatives serve
                     if without is None:
                         without = reach[equation](state)
-                    kept = state.p
-                    state.p = Point({**values, **p.secant}, state.rec.name, ())
-                    out[p.name] = np.asarray(reach[equation](state).value) - np.asarray(without.value)
-                    state.p = kept
+                    at = state.at(Point({**values, **p.secant}, state.rec.name, ()))
+                    out[p.name] = np.asarray(reach[equation](at).value) - np.asarray(without.value)
         return out
 
     def _coordinates(self, state: State, equation: str) -> dict[str, Any]:
