@@ -7,7 +7,7 @@ controller's own: a constant and a part in proportion to the current.
 
 import numpy as np
 
-from .dual import Dual
+from .dual import Dual, Number
 from .point import State, effect_name
 from .signals import UNRESOLVED
 from .terms import with_hook
@@ -55,7 +55,7 @@ def residual(state: State) -> Dual:
         out.append(own + share * stays)
     names = {n for d in out for n in d.slopes}
     sizes = [len(np.atleast_1d(d.value)) for d in out]
-    slopes = {
+    slopes: dict[str, Number] = {
         n: np.concatenate([np.broadcast_to(d.slopes.get(n, 0.0), size) for d, size in zip(out, sizes, strict=True)])
         for n in names
     }

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .acquisition import true_currents
-from .dual import Dual, value_of
+from .dual import Dual, Number, value_of
 from .point import State, effect_name
 from .shape import trapezoid_at, trapezoid_swept
 from .terms import with_hook
@@ -63,9 +63,9 @@ def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> D
     off, r = float(value_of(shift)), float(value_of(ramp))
     F2, dr2 = trapezoid_swept(high - off, r)
     F1, dr1 = (_before(F2), _before(dr2)) if joined else trapezoid_swept(low - off, r)
-    if not (isinstance(shift, Dual) and shift.slopes):
-        f1 = f2 = 0.0
-    else:
+    f1: Number = 0.0
+    f2: Number = 0.0
+    if isinstance(shift, Dual) and shift.slopes:
         f2 = trapezoid_at(high - off, r)[0]
         f1 = _before(f2) if joined else trapezoid_at(low - off, r)[0]
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
