@@ -66,8 +66,8 @@ def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> D
     f1: Number = 0.0
     f2: Number = 0.0
     if isinstance(shift, Dual) and shift.slopes:
-        f2 = trapezoid_at(high - off, r)[0]
-        f1 = _before(f2) if joined else trapezoid_at(low - off, r)[0]
+        at_end = trapezoid_at(high - off, r)[0]
+        f1, f2 = _before(at_end) if joined else trapezoid_at(low - off, r)[0], at_end
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
         of = state.p.of(effect_name(m))
