@@ -42,10 +42,7 @@ def run(args: argparse.Namespace) -> None:
     InputError : recordings, a twin or a setting that cannot be used
     """
     from .. import config
-    from ..equations.run import diagnose_folder
     from ..errors import InputError
-    from ..gap.run import diagnose_path
-    from ..machines.run import diagnose_file
 
     target = None
     if args.experiment:
@@ -56,12 +53,18 @@ def run(args: argparse.Namespace) -> None:
     tracking = not args.no_tracking
     by = args.by or "equations"
     if by == "equations" and args.twin == "actuator":
+        from ..equations.run import diagnose_folder
+
         diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking)
     elif by == "equations":
         if target is not None:
             raise InputError("--experiment: a measured machine has no simulator that could run one")
+        from ..machines.run import diagnose_file
+
         diagnose_file(args.path, args.twin, spec, args.out, args.exclude, tracking)
     else:
+        from ..gap.run import diagnose_path
+
         diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
     if target is not None:
         print(f"snakemake --cores all --config experiment={Path(target).stem}")

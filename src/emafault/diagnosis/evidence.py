@@ -8,6 +8,8 @@ from scipy.special import log_ndtr
 
 from ..actuator.compiled import compiled
 
+MANY = 32  # rows from which on a matrix is factored along its rows
+SEVERAL = 200  # nuisances from which on those of each recording are integrated out by themselves
 RIDGES = (0.0, 1e-12, 1e-10, 1e-8)  # of a unit diagonal, the first that makes a matrix definite
 
 
@@ -71,6 +73,8 @@ def marginalise(normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.n
     The Schur complement of the nuisances in the normal matrix (van Haasteren and Vallisneri 2014, Phys. Rev. D 90
     104012, do the same for pulsar timing).
     """
+    if len(nuisances) > SEVERAL:
+        return _marginalise_each(normal, nuisances, mean, sd, fixed)
     n = np.array([normal.index[x] for x in nuisances], int)
     x = np.setdiff1d(np.arange(len(normal.names)), n)
     H, g = normal.H, normal.g
@@ -83,6 +87,39 @@ def marginalise(normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.n
     b = -(g[x] + H[np.ix_(x, n)] @ mean - Hnx.T @ solved[:, -1])
     constant = -0.5 * normal.c - g[n] @ mean - 0.5 * mean @ H[np.ix_(n, n)] @ mean
     constant += 0.5 * gn @ solved[:, -1] - factor.half_log_determinant()
+    return Reduced([normal.names[k] for k in x], 0.5 * (M + M.T), b, float(constant), fixed[x])
+
+
+def _marginalise_each(
+    normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.ndarray, fixed: np.ndarray
+) -> Reduced:
+    """The same, what belongs to one recording (``name@recording``) first, which meets nothing of another's."""
+    n = np.array([normal.index[x] for x in nuisances], int)
+    x = np.setdiff1d(np.arange(len(normal.names)), n)
+    g = normal.g + normal.H[:, n] @ mean
+    constant = -0.5 * normal.c - normal.g[n] @ mean - 0.5 * mean @ normal.H[np.ix_(n, n)] @ mean
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(nuisances):
+        groups.setdefault(name.partition("@")[2], []).append(k)
+    common = np.array(groups.pop("", []), int)
+    rest = np.concatenate([n[common], x])
+    S, gs = normal.H[np.ix_(rest, rest)], g[rest]
+    for group in groups.values():
+        own, width = n[group], sd[group]
+        touched = np.flatnonzero(normal.H[own][:, rest].any(axis=0))
+        cross = normal.H[np.ix_(own, rest[touched])] * width[:, None]
+        factor = Definite(normal.H[np.ix_(own, own)] * np.outer(width, width) + np.eye(len(own)))
+        solved = factor.solve(np.column_stack([cross, g[own] * width]))
+        S[np.ix_(touched, touched)] -= cross.T @ solved[:, :-1]
+        gs[touched] -= cross.T @ solved[:, -1]
+        constant += 0.5 * (g[own] * width) @ solved[:, -1] - factor.half_log_determinant()
+    m, width = len(common), sd[common]
+    cross = S[:m, m:] * width[:, None]
+    factor = Definite(S[:m, :m] * np.outer(width, width) + np.eye(m))
+    solved = factor.solve(np.column_stack([cross, gs[:m] * width]))
+    M = S[m:, m:] - cross.T @ solved[:, :-1]
+    constant += 0.5 * (gs[:m] * width) @ solved[:, -1] - factor.half_log_determinant()
+    b = cross.T @ solved[:, -1] - gs[m:]
     return Reduced([normal.names[k] for k in x], 0.5 * (M + M.T), b, float(constant), fixed[x])
 
 
@@ -109,9 +146,35 @@ def log_evidence(
 
 
 @compiled
+def _factored_by_rows(A):
+    """The same sums in another order of loops, along the rows of memory."""
+    n = A.shape[0]
+    for k in range(n):
+        for m in range(k):
+            A[m, k] = A[k, m]
+    for k in range(n):
+        d = A[k, k]
+        if not d > 0.0:
+            return False
+        d = np.sqrt(d)
+        for m in range(k, n):
+            A[k, m] /= d
+        for m in range(k + 1, n):
+            f = A[k, m]
+            for q in range(m, n):
+                A[m, q] -= f * A[k, q]
+    for k in range(n):
+        for m in range(k):
+            A[k, m] = A[m, k]
+    return True
+
+
+@compiled
 def factored(A):
     """Lower Cholesky factor, in place; whether there is one."""
     n = A.shape[0]
+    if n > MANY:
+        return _factored_by_rows(A)
     for k in range(n):
         d = A[k, k]
         for q in range(k):
@@ -162,12 +225,13 @@ def _evidence(M, b, constant, fixed, free, mean, sd):
         constant += 0.5 * z[k] * z[k] - np.log(A[k, k])
     inverse = np.zeros((n, n))
     for k in range(n):
-        inverse[k, k] = 1.0 / A[k, k]
+        for q in range(k):
+            f = A[k, q]
+            for m in range(q + 1):
+                inverse[k, m] -= f * inverse[q, m]
         for m in range(k):
-            x = 0.0
-            for q in range(m, k):
-                x -= A[k, q] * inverse[q, m]
-            inverse[k, m] = x / A[k, k]
+            inverse[k, m] /= A[k, k]
+        inverse[k, k] = 1.0 / A[k, k]
     for m in range(n):
         step, power = 0.0, 0.0
         for k in range(m, n):

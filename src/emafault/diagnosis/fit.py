@@ -280,7 +280,12 @@ class Bench:
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
         """Units and remainders of the present point, ready for the search."""
         out: dict[tuple[str, int], Candidate] = {}
+        owns: dict[str, list[int]] = {}
+        for k, n in enumerate(reduced.names):
+            if n.startswith("own."):
+                owns.setdefault(n.split(".")[1], []).append(k)
         for unit in self.units:
+            own = np.array(owns.get(unit.id, ()), int)
             for v, variant in enumerate(self.active(unit)):
                 names = [p.name for p in variant.parameters]
                 if not all(n in reduced.index for n in names):
@@ -289,7 +294,6 @@ class Bench:
                 prior = [self.prior(n) for n in names]
                 signs = np.array(list(variant.signs) or [0] * len(names))
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
-                own = np.array([k for k, n in enumerate(reduced.names) if n.startswith(f"own.{unit.id}.")], int)
                 plain = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,

@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import Definite, Normal, factored
 from .model import Block
-from .whitening import OUTLIER, autoregression, filtered, whiten
+from .whitening import OUTLIER, autoregression, filtered, products, whiten
 
 OWN = slice(1, 14)  # functions that an effect's own form is made of
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
@@ -79,10 +79,17 @@ def _added(block: Block, amounts: Mapping[str, float]) -> np.ndarray:
 def white_rows(
     block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
 ) -> tuple[list[str], np.ndarray]:
+    """A block's columns as ``raw_columns`` has them: names, and (row, column) divided by the noise's covariance."""
+    names, columns = raw_columns(block, wanted, remainder, own)
+    return names, whiten(block.bands, block.usable, columns_of(columns, len(block.residual)))
+
+
+def raw_columns(
+    block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
+) -> tuple[list[str], list]:
     """A block's columns ``wanted`` that act in it, with its remainder's and units' own forms, and its residual last:
-    names without that of the residual, and (row, column) divided by the noise's covariance."""
+    names without that of the residual, and columns, each (row,) or a scalar."""
     names = [n for n in wanted if n in block.columns]
-    count = len(block.residual)
     columns = [block.columns[n] for n in names]
     if remainder:
         size = float(np.sqrt(np.median(block.bands[0])))
@@ -91,7 +98,7 @@ def white_rows(
     for unit, amounts in (own or {}).items():
         more, extra = own_columns(block, unit, amounts)
         names, columns = names + more, columns + extra
-    return names, whiten(block.bands, block.usable, columns_of([*columns, block.residual], count))
+    return names, [*columns, block.residual]
 
 
 def columns_of(columns: Sequence, count: int) -> np.ndarray:
@@ -107,6 +114,13 @@ def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weight
     weighed = _weighed(rows, weights)
     used = block.usable if weights is None else weights.usable
     return White(block.recording, block.equation, names, weighed.T @ weighed, int(used.sum()))
+
+
+def compressed_columns(block: Block, names: list[str], columns: Sequence, weights: Weights | None) -> White:
+    """The same of raw columns, without all of their white rows in memory at once."""
+    w = weights if weights is not None else Weights(block.usable, np.zeros(0), 1.0)
+    gram = products(block.bands, block.usable, columns, w.usable, w.coefficients, w.variance)
+    return White(block.recording, block.equation, names, gram, int(w.usable.sum()))
 
 
 def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
@@ -198,12 +212,18 @@ def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]
     return dict(zip(names, d.tolist(), strict=True))
 
 
-def weights_from(block: Block, names: Sequence[str], rows: np.ndarray, deviations: Mapping[str, float]) -> Weights:
-    """Weights of a block from what a full model's deviations leave of its white rows; common to all hypotheses."""
+def weights_from(block: Block, names: Sequence[str], columns: Sequence, deviations: Mapping[str, float]) -> Weights:
+    """Weights of a block from what a full model's deviations leave of its rows; common to all hypotheses.
+
+    ``columns`` as ``raw_columns`` has them.
+    """
     usable = block.usable
     if not usable.any():
         return Weights(usable, np.zeros(0), 1.0)
-    left = rows[:, :-1] @ np.array([deviations.get(n, 0.0) for n in names]) + rows[:, -1]
+    raw = np.array(block.residual, float)
+    for n, column in zip(names, columns, strict=False):
+        raw += deviations.get(n, 0.0) * column
+    left = whiten(block.bands, usable, raw[:, None])[:, 0]
     scale = np.median(np.abs(left[usable])) / 0.6745
     out = usable & (np.abs(left) > OUTLIER * max(scale, 1e-12))
     keep = usable & ~(out | np.roll(out, 1))

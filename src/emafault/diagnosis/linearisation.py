@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .linear import Weights, White, compressed, correct, weights_from, white_rows
+from .linear import Weights, White, compressed_columns, correct, raw_columns, weights_from
 from .model import Block
 
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
-KEPT = 2e8  # bytes of white rows that a process keeps from a pass to the one that renews the weights
+KEPT = 2e8  # bytes of columns that a process keeps from a pass to the one that renews the weights
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,6 @@ class Task:
     corrected: bool = True
 
 
-Parts = tuple[list[Block], list[tuple[list[str], np.ndarray]]]
 Carried = dict[str, Weights]  # of a recording's blocks, by equation
 
 
@@ -39,16 +38,26 @@ class Linearisation:
 
     def __init__(self, machine):
         self.machine = machine
-        self.kept: dict[str, Parts] = {}
+        self.kept: dict[str, list[Block]] = {}
 
     def compress(self, task: Task, recording: str, weights: Carried) -> tuple[list[White], Carried]:
         """Normal matrices of a recording's blocks, and its weights from here on."""
-        blocks, parts = self.kept.pop(recording) if recording in self.kept else self._white(task, recording)
-        if task.again and self._size() + _size(parts) < KEPT:
-            self.kept[recording] = blocks, parts
+        blocks = self.kept.pop(recording) if recording in self.kept else self._blocks(task, recording)
+        if task.again and sum(map(_size, self.kept.values())) + _size(blocks) < KEPT:
+            self.kept[recording] = blocks
+        renewed: Carried = {}
+        out = []
+        for b in blocks:
+            names, columns = raw_columns(
+                b, task.wanted, task.remainders is None or b.equation in task.remainders,
+                task.own if b.equation not in SETTINGS else None,
+            )  # fmt: skip
+            if task.full is not None:
+                renewed[b.equation] = weights_from(b, names, columns, task.full)
+            weight = weights.get(b.equation) if task.full is None else renewed[b.equation]
+            out.append(compressed_columns(b, names, columns, weight))
         if task.full is not None:
-            weights = {b.equation: weights_from(b, *p, task.full) for b, p in zip(blocks, parts, strict=True)}
-        out = [compressed(b, *p, weights.get(b.equation)) for b, p in zip(blocks, parts, strict=True)]
+            weights = renewed
         if task.corrected:
             disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=set(task.wanted))
             for white, block, other in zip(out, blocks, disturbed, strict=True):
@@ -56,20 +65,10 @@ class Linearisation:
                 correct(white, block, other, weights.get(block.equation), own)
         return out, weights
 
-    def _white(self, task: Task, recording: str) -> Parts:
-        blocks = self.machine.blocks(task.values, recording, wanted=set(task.wanted))
-        parts = [
-            white_rows(
-                b, task.wanted, task.remainders is None or b.equation in task.remainders,
-                task.own if b.equation not in SETTINGS else None,
-            )
-            for b in blocks
-        ]  # fmt: skip
-        return blocks, parts
-
-    def _size(self) -> int:
-        return sum(_size(parts) for _, parts in self.kept.values())
+    def _blocks(self, task: Task, recording: str) -> list[Block]:
+        return self.machine.blocks(task.values, recording, wanted=set(task.wanted))
 
 
-def _size(parts: list[tuple[list[str], np.ndarray]]) -> int:
-    return sum(rows.nbytes for _, rows in parts)
+def _size(blocks: list[Block]) -> int:
+    """Bytes of the columns."""
+    return sum(np.asarray(c).nbytes for b in blocks for c in b.columns.values())

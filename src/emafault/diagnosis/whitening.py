@@ -1,5 +1,7 @@
 """Rows of a block made white: by the noise's banded covariance, then by what a full model leaves."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..actuator.compiled import compiled
@@ -8,6 +10,7 @@ LEFT_OUT = 1e8  # times a row's variance where it is not used
 OUTLIER = 5.5  # standard deviations of a full model's residual
 ORDER = 12  # largest order of the autoregressive model of what is left
 LAGS = 48  # of its spectrum's estimate
+TILE = 1500  # rows that are whitened together
 GRID = 128  # frequencies at which it is looked at
 
 
@@ -71,13 +74,81 @@ def _filter(rows, keep, coefficients, scale):
     return out
 
 
-def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """(row, column) divided in place by the Cholesky factor of the banded covariance; rows not usable become zero."""
+@compiled
+def _white_tile(tile, lower, usable, start, before, memory, keep, coefficients, scale):
+    """(row, column) of a part of the rows, whitened and filtered; ``tile`` (column, row) are those from ``start`` on.
+
+    ``before`` (band, column) and ``memory`` (lag, column) are rings of what factor and filter hold of earlier
+    rows, carried on.
+    """
+    m, n = tile.shape
+    width, lags = lower.shape[0], memory.shape[0]
+    out = np.zeros((n, m))
+    for r in range(n):
+        k = start + r
+        own, last = k % width, k % lags
+        a = 1.0 / lower[0, k]
+        for q in range(m):
+            before[own, q] = tile[q, r]
+        for p in range(1, min(width - 1, k) + 1):
+            f, other = lower[p, k], (k - p) % width
+            if f != 0.0:
+                for q in range(m):
+                    before[own, q] -= f * before[other, q]
+        for q in range(m):
+            before[own, q] *= a
+            memory[last, q] = before[own, q] if usable[k] else 0.0
+        if not keep[k]:
+            continue
+        for q in range(m):
+            out[r, q] = memory[last, q]
+        for p in range(min(len(coefficients), k)):
+            if keep[k - 1 - p]:
+                f, other = coefficients[p], (k - 1 - p) % lags
+                for q in range(m):
+                    out[r, q] -= f * memory[other, q]
+        for q in range(m):
+            out[r, q] *= scale
+    return out
+
+
+def products(
+    bands: list[np.ndarray],
+    usable: np.ndarray,
+    columns: Sequence,
+    keep: np.ndarray,
+    coefficients: np.ndarray,
+    variance: float,
+) -> np.ndarray:
+    """(column, column) products of columns, each (row,) or a scalar, whitened and filtered: part after part, so that
+    they are never all in memory."""
+    n, m = len(bands[0]), len(columns)
+    lower = _factored(bands, usable)
+    before, memory = np.zeros((len(bands), m)), np.zeros((len(coefficients) + 1, m))
+    out = np.zeros((m, m))
+    for start in range(0, n, TILE):
+        end = min(start + TILE, n)
+        tile = np.empty((m, end - start))
+        for k, c in enumerate(columns):
+            tile[k] = c[start:end] if np.ndim(c) else c
+        rows = _white_tile(
+            tile, lower, usable, start, before, memory, keep, np.asarray(coefficients, float), 1.0 / np.sqrt(variance)
+        )
+        out += rows.T @ rows
+    return out
+
+
+def _factored(bands: list[np.ndarray], usable: np.ndarray) -> np.ndarray:
     n = len(bands[0])
     full = np.zeros((len(bands), n))
     for k, band in enumerate(bands):
         full[k, : n - k] = band
-    _substitute(_factor(full, usable), usable, rows)
+    return _factor(full, usable)
+
+
+def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(row, column) divided in place by the Cholesky factor of the banded covariance; rows not usable become zero."""
+    _substitute(_factored(bands, usable), usable, rows)
     return rows
 
 

@@ -1,5 +1,7 @@
 """Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .dual import Dual
@@ -29,13 +31,18 @@ def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
     late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
     out = x
     if late.slopes or late.value:
-        out = out + late * x.linear(delayed, size)
+        out = out + late * _changed(x, delayed, late, size)
     if early.slopes or early.value:
-        out = out + early * x.linear(advanced, size)
+        out = out + early * _changed(x, advanced, early, size)
     skew = p(f"skew.{channel}@{p.recording}")
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
     return out
+
+
+def _changed(x: Dual, operate: Callable[[np.ndarray], np.ndarray], lag: Dual, size: int) -> Dual:
+    """``x.linear``, without the derivatives where these are to be multiplied by a lag of zero."""
+    return x.linear(operate, size) if lag.value else Dual(x.value).linear(operate, size)
 
 
 def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:

@@ -7,7 +7,7 @@ controller's own: a constant and a part in proportion to the current.
 
 import numpy as np
 
-from .dual import Dual
+from .dual import Dual, Number
 from .point import State, effect_name
 from .signals import UNRESOLVED
 from .terms import with_hook
@@ -21,8 +21,12 @@ STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 def rows_of(state: State, j: int) -> np.ndarray:
     """Intervals in which an edge of phase j may lie."""
-    low, high, _ = _sweep(state.rec.rows_from, j)
     rec = state.rec.rows_from
+    return rec.once(("rows_of", j), lambda: _rows_of(rec, j))
+
+
+def _rows_of(rec, j: int) -> np.ndarray:
+    low, high, _ = _sweep(rec, j)
     half = high - low < np.pi / 3.0
     a = rec.actuator
     passing = 2.0 * a.inductance * np.abs(rec.current[:, STAYS[j]]) / a.bus_voltage  # s, about
@@ -51,7 +55,7 @@ def residual(state: State) -> Dual:
         out.append(own + share * stays)
     names = {n for d in out for n in d.slopes}
     sizes = [len(np.atleast_1d(d.value)) for d in out]
-    slopes = {
+    slopes: dict[str, Number] = {
         n: np.concatenate([np.broadcast_to(d.slopes.get(n, 0.0), size) for d, size in zip(out, sizes, strict=True)])
         for n in names
     }
@@ -62,7 +66,7 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     """Intervals of phase j, their ends from the nominal edge, and where the current passes over (electrical rad)."""
     rec, p = state.rec, state.p
     rows = rows_of(state, j)
-    low, high, _ = (x[rows] for x in _sweep(rec, j))
+    low, high = rec.once(("ends", j), lambda: tuple(x[rows] for x in _sweep(rec, j)[:2]))
     early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)

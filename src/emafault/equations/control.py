@@ -36,7 +36,9 @@ def residual(state: State) -> Dual:
     output = model + uniform_filter1d(rec.output - model, odd(AVERAGED / h), mode="nearest")
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
     seen = model + uniform_filter1d(rec.speed_recorded - model, odd(AVERAGED / h), mode="nearest")
-    wanted = p("controller.position_gain") * (a.gear_ratio * (_commanded(rec, lead) - _at_ticks(output, h, lead)))
+    wanted = p("controller.position_gain") * (
+        a.gear_ratio * (rec.once(("commanded",), lambda: _commanded(rec, lead)) - _at_ticks(output, h, lead))
+    )
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
     error = asked - _centred(seen, h, lead)
@@ -51,7 +53,7 @@ def residual(state: State) -> Dual:
         late = late + m.delay(p.of(effect_name(m)))
     asked_for = asked_for - late * np.gradient(np.asarray(asked_for.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    pair = 0.5 * np.abs(rec.current).sum(axis=1) * sign
+    pair = rec.level * sign
     width = block_length(rec)
     out = a.speed_gain * (_calmed(pair, h) / gain - asked_for)
     return out.linear(lambda x: _blocks(x, width), rec.size)
@@ -63,14 +65,13 @@ def _calmed(x: np.ndarray, h: float) -> np.ndarray:
 
 def _at_limit(rec) -> np.ndarray:
     """(sample,) where the current stands at its highest: the demand is limited there."""
-    level = 0.5 * np.abs(rec.current).sum(axis=1)
-    return level > NEAR_LIMIT * rec.actuator.current_limit
+    return rec.level > NEAR_LIMIT * rec.actuator.current_limit
 
 
 def _without_headroom(rec) -> np.ndarray:
     """(sample,) where back-EMF and resistance leave the supply too little to drive the current that is asked for."""
     a = rec.actuator
-    needed = 2.0 * a.back_emf * np.abs(rec.speed) + a.resistance * np.abs(rec.current).sum(axis=1)
+    needed = 2.0 * a.back_emf * np.abs(rec.speed) + a.resistance * (2.0 * rec.level)
     return needed > (1.0 - HEADROOM) * a.bus_voltage
 
 
@@ -112,7 +113,7 @@ def late(state: State) -> np.ndarray:
     """(block,) what a demand that is ``USUAL_DELAY`` late leaves, in units of the noise; of the current that flows."""
     rec = state.rec
     width = block_length(rec)
-    level = 0.5 * np.abs(rec.current).sum(axis=1) * np.sign(state.drive)
+    level = rec.level * np.sign(state.drive)
     rate = np.gradient(uniform_filter1d(level, odd(BLOCK / rec.interval), mode="nearest"), rec.interval)
     return USUAL_DELAY * _blocks(rate, width) / np.sqrt(noise_bands(state)[0])
 
@@ -120,23 +121,32 @@ def late(state: State) -> np.ndarray:
 def usable(state: State) -> np.ndarray:
     """(block,) where the rotor turns and no limit may be reached at random."""
     rec = state.rec
+    return rec.once(("control.usable",), lambda: _usable(rec))
+
+
+def _usable(rec) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
     limited = binary_dilation(_at_limit(rec) | _without_headroom(rec), iterations=odd(SPEED_SPAN / rec.interval))
     free = ~limited[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean
-    level = 0.5 * np.abs(rec.current).sum(axis=1)[: count * width].reshape(count, width)
+    level = rec.level[: count * width].reshape(count, width)
     known = moving & free & (level.min(axis=1) > rec.actuator.hysteresis)
     return known[1:] & known[:-1]
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (A2): of the current, and of what the controller saw, through its law."""
-    rec, a, s = state.rec, state.rec.actuator, state.rec.noise
+    rec = state.rec
+    return rec.once(("control.noise_bands",), lambda: _noise_bands(rec))
+
+
+def _noise_bands(rec) -> list[np.ndarray]:
+    a, s = rec.actuator, rec.noise
     h, width = rec.interval, block_length(rec)
     count = rec.size // width - 1
-    level = _means(0.5 * np.abs(rec.current).sum(axis=1), width)
+    level = _means(rec.level, width)
     change = np.abs(np.diff(level, append=level[-1:])) / width
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2

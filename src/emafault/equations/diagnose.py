@@ -101,7 +101,9 @@ def diagnose(
     if not confirm:
         return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own)
     # from here on the confirm recordings are open
-    whole = ReferenceActuator(actuator, {n: Signals.of(n, r, actuator, own) for n, r in recordings.items()}, exclude)
+    known = machine.recordings
+    signals = {n: known[n] if n in known else Signals.of(n, r, actuator, own) for n, r in recordings.items()}
+    whole = ReferenceActuator(actuator, signals, exclude)
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
     units, observed = all_fit.search.units.values(), tuple(whole.observed())

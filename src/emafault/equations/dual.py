@@ -1,10 +1,11 @@
 """Forward-mode differentiation: a value with its derivatives by named parameters.
 
 An equation is written once, as a sum of terms; its columns in the linear model follow by the chain rule. Values are
-scalars or arrays over the samples of one recording; a derivative is a scalar where it is the same for all samples.
+scalars or arrays over the samples of one recording; a derivative is a scalar where it is the same for all samples, and
+absent where it is none. What is multiplied by a scalar 0 is not computed.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,17 +18,19 @@ class Dual:
     __array_ufunc__ = None  # an array on the left of an operator leaves it to this class
     __slots__ = ("slopes", "value")
 
-    def __init__(self, value: Number, slopes: Mapping[str, Number] | None = None):
+    def __init__(self, value: Number, slopes: dict[str, Number] | None = None):
         self.value = value
-        self.slopes: dict[str, Number] = dict(slopes or {})
+        self.slopes: dict[str, Number] = {} if slopes is None else slopes  # never changed, for others may have it too
 
     def __add__(self, other):
         if not isinstance(other, Dual):
-            return Dual(self.value + other, self.slopes)
+            return self if _is(other, 0.0) else Dual(self.value + other, self.slopes)
+        if not other.slopes:
+            return self if _is(other.value, 0.0) else Dual(self.value + other.value, self.slopes)
         out = dict(self.slopes)
         for name, slope in other.slopes.items():
             out[name] = out[name] + slope if name in out else slope
-        return Dual(self.value + other.value, out)
+        return Dual(_plus(self.value, other.value), out)
 
     __radd__ = __add__
 
@@ -35,19 +38,29 @@ class Dual:
         return Dual(-self.value, {n: -s for n, s in self.slopes.items()})
 
     def __sub__(self, other):
-        return self + (-other)
+        if not isinstance(other, Dual):
+            return self if _is(other, 0.0) else Dual(self.value - other, self.slopes)
+        if not other.slopes:
+            return self if _is(other.value, 0.0) else Dual(self.value - other.value, self.slopes)
+        out = dict(self.slopes)
+        for name, slope in other.slopes.items():
+            out[name] = out[name] - slope if name in out else -slope
+        return Dual(self.value if _is(other.value, 0.0) else self.value - other.value, out)
 
     def __rsub__(self, other):
-        return (-self) + other
+        return Dual(other - self.value, {n: -s for n, s in self.slopes.items()})
 
     def __mul__(self, other):
         if not isinstance(other, Dual):
-            return Dual(self.value * other, {n: s * other for n, s in self.slopes.items()})
-        out = {n: s * other.value for n, s in self.slopes.items()}
-        for name, slope in other.slopes.items():
-            term = slope * self.value
-            out[name] = out[name] + term if name in out else term
-        return Dual(self.value * other.value, out)
+            return self.through(_times(self.value, other), other)
+        if not other.slopes:
+            return self.through(_times(self.value, other.value), other.value)
+        out = {} if _is(other.value, 0.0) else {n: _times(s, other.value) for n, s in self.slopes.items()}
+        if not _is(self.value, 0.0):
+            for name, slope in other.slopes.items():
+                term = _times(slope, self.value)
+                out[name] = out[name] + term if name in out else term
+        return Dual(_times(self.value, other.value), out)
 
     __rmul__ = __mul__
 
@@ -65,7 +78,11 @@ class Dual:
 
     def through(self, value: Number, slope: Number) -> "Dual":
         """A function of this one: its value and its derivative by this one's value."""
-        return Dual(value, {n: s * slope for n, s in self.slopes.items()})
+        if not self.slopes or _is(slope, 1.0):
+            return Dual(value, self.slopes)
+        if _is(slope, 0.0):
+            return Dual(value)
+        return Dual(value, {n: _times(s, slope) for n, s in self.slopes.items()})
 
     def linear(self, operate: Callable[[np.ndarray], np.ndarray], size: int) -> "Dual":
         """A linear operator on arrays of ``size`` samples, a shift or a filter."""
@@ -78,6 +95,23 @@ class Dual:
     def kept(self, mask: np.ndarray) -> "Dual":
         """Zero where the mask is not."""
         return Dual(np.where(mask, self.value, 0.0), {n: np.where(mask, s, 0.0) for n, s in self.slopes.items()})
+
+
+def _is(x: Number, number: float) -> bool:
+    return isinstance(x, float) and x == number
+
+
+def _plus(x: Number, y: Number) -> Number:
+    return y if _is(x, 0.0) else x if _is(y, 0.0) else x + y
+
+
+def _times(x: Number, y: Number) -> Number:
+    """Product; none of a scalar 0 is computed, nor of a scalar 1."""
+    if isinstance(x, float) and (x == 1.0 or x == 0.0):
+        return y if x == 1.0 else 0.0
+    if isinstance(y, float) and (y == 1.0 or y == 0.0):
+        return x if y == 1.0 else 0.0
+    return x * y
 
 
 def value_of(x: "Dual | Number") -> Number:

@@ -95,6 +95,11 @@ def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
 def _runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where runs begin among their rows, their lengths, and the rows (sample,): none around phase j's commutations."""
     rec = state.rec.rows_from
+    return rec.once(("runs", j), lambda: _new_runs(state, j))
+
+
+def _new_runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rec = state.rec.rows_from
     known = np.ones(rec.size, bool)
     known[[0, -1]] = False
     for edge in (j, (j + 1) % 3):
@@ -112,6 +117,10 @@ def _runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def switched_on(state: State, j: int) -> np.ndarray:
     """(sample,) where phase j conducts at any time of an interval or of the ``BESIDE`` next to it on either side."""
     rec = state.rec.rows_from
+    return rec.once(("switched_on", j), lambda: _switched_on(rec, j))
+
+
+def _switched_on(rec, j: int) -> np.ndarray:
     x = np.mod(rec.actuator.pole_pairs * rec.middle - rec.axis[j], np.pi)
     reach = EDGE - REACH - rec.actuator.pole_pairs * np.abs(rec.half_sweep)
     return binary_dilation((x > reach) & (x < np.pi - reach), iterations=BESIDE)

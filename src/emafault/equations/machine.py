@@ -28,6 +28,7 @@ SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperatu
 EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
+LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 
 
 class ReferenceActuator:
@@ -40,6 +41,8 @@ class ReferenceActuator:
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
         self._along: dict[tuple[str, str], dict[str, Any]] = {}
+        self._functions: dict[str, dict[str, Any]] = {}
+        self.large = sum(r.size for r in self.recordings.values()) > LARGE
         self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
         self.parameters = self._nuisances()
@@ -167,8 +170,9 @@ class ReferenceActuator:
     # ---- equations
     def prepare(self, name: str) -> None:
         """Compute once what does not depend on the point."""
-        if name not in self._disturbed:
-            self._disturbed[name] = self.recordings[name].disturbed(1)
+        if (name, "torque") not in self._along:
+            if not self.large:
+                self._disturbed[name] = self.recordings[name].disturbed(1)
             self.blocks({n: p.off for n, p in self.parameters.items()}, name, wanted=())
 
     def blocks(
@@ -181,6 +185,8 @@ class ReferenceActuator:
         rec = self.recordings[name]
         if disturbed:
             if name not in self._disturbed:
+                if self.large:
+                    self._disturbed.clear()
                 self._disturbed[name] = rec.disturbed(1)
             rec = self._disturbed[name]
         return self._recording(values, rec, wanted)
@@ -243,10 +249,8 @@ class ReferenceActuator:
                         continue  # at a point where the effect is on, its own derivatives serve
                     if without is None:
                         without = reach[equation](state)
-                    kept = state.p
-                    state.p = Point({**values, **p.secant}, state.rec.name, ())
-                    out[p.name] = np.asarray(reach[equation](state).value) - np.asarray(without.value)
-                    state.p = kept
+                    at = state.at(Point({**values, **p.secant}, state.rec.name, ()))
+                    out[p.name] = np.asarray(reach[equation](at).value) - np.asarray(without.value)
         return out
 
     def _coordinates(self, state: State, equation: str) -> dict[str, Any]:
@@ -254,11 +258,17 @@ class ReferenceActuator:
         key = state.rec.name, equation
         if key not in self._along:
             self._along[key] = self._new_coordinates(state, equation)
-        return self._along[key]
+        return self._functions_of(state.rec) | self._along[key]
 
-    def _new_coordinates(self, state: State, equation: str) -> dict[str, Any]:
-        """What the rows of an equation lie along, and the drivers that a coefficient would multiply; (row,) each."""
-        rec = state.rec
+    def _functions_of(self, rec: Signals) -> dict[str, Any]:
+        """What the samples of a recording lie along, and the functions that remainders are made of; (sample,) each."""
+        if rec.name not in self._functions:
+            if self.large:
+                self._functions.clear()
+            self._functions[rec.name] = self._new_functions(rec.rows_from)
+        return self._functions[rec.name]
+
+    def _new_functions(self, rec: Signals) -> dict[str, Any]:
         w = rec.speed / 100.0
         level = np.abs(rec.current).sum(axis=1) / 4.0
         t = rec.time / rec.time[-1] - 0.5
@@ -274,7 +284,16 @@ class ReferenceActuator:
             np.full(rec.size, rec.dT_measured / 50.0),
             np.exp(-np.abs(rec.speed) / 8.0), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
         ]  # fmt: skip
-        drivers = [np.ones(rec.size)]
+        return {**base, "phi": np.array(phi)}
+
+    def _new_coordinates(self, state: State, equation: str) -> dict[str, Any]:
+        """What is an equation's own: the drivers that a coefficient would multiply, and where its rows are not the
+        samples, what they lie along; (row,) each."""
+        rec = state.rec
+        base = dict(self._functions_of(rec))
+        phi = list(base.pop("phi"))
+        w = rec.speed / 100.0
+        drivers = [np.broadcast_to(1.0, rec.size)]
         if equation.startswith("electrical"):
             j = "abc".index(equation[-1])
             drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * 0.02]
@@ -289,7 +308,7 @@ class ReferenceActuator:
             drivers += [state.bus_current]
         elif equation == "position":
             drivers += [rec.direction, rec.acceleration / 1e3]
-        of: Callable[[np.ndarray], np.ndarray] = np.asarray
+        of: Callable[[np.ndarray], np.ndarray] | None = None
         if equation == "control":
             width = control.block_length(rec)
             blocks = (np.arange(rec.size // width - 1) + 1) * width
@@ -299,6 +318,9 @@ class ReferenceActuator:
             of = rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
         elif equation.startswith("electrical") and rec.current_end is None:
             of = electrical.averaging(state, "abc".index(equation[-1]))
+        kinds = {"slow": SLOW_FUNCTIONS, "each": [f - (equation == "control" and f > LEVEL) for f in EACH]}
+        if of is None:
+            return {"drivers": drivers, **kinds}
         rows = [of(d) for d in drivers]
         if equation == "control":
             rows.append(control.late(state))
@@ -306,8 +328,7 @@ class ReferenceActuator:
             **{k: of(v) for k, v in base.items()},
             "phi": np.array([of(f) for f in phi]),
             "drivers": np.array(rows),
-            "slow": SLOW_FUNCTIONS,
-            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
+            **kinds,
         }
 
 

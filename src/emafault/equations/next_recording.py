@@ -134,7 +134,18 @@ def _with_next(fit: Fit, new: Normal) -> Normal:
 def _log_odds(bench: Bench, normal: Normal, first: Model, rival: Model, widths: Mapping[str, float]) -> float:
     """Difference of the log evidences of two sets under a normal matrix, what is the new recording's own integrated."""
     own = np.array([k for k, n in enumerate(normal.names) if n in widths], int)
-    rest = np.array([k for k, n in enumerate(normal.names) if n not in widths], int)
+    # a column that is off in both sets, and at the point, changes nothing
+    kept = set(bench.nuisances) | {n for m in (first, rival) for n in m.deviations}
+    equations = [u.split(":", 1)[1] for m in (first, rival) for u in m.units if u.startswith("remainder:")]
+    left = tuple(f"remainder.{e}." for e in equations)
+    rest = np.array(
+        [
+            k
+            for k, n in enumerate(normal.names)
+            if n not in widths and (n in kept or n.startswith(left) or bench.prior(n)[2] != 0.0)
+        ],
+        int,
+    )
     H = normal.H[np.ix_(rest, rest)]
     if len(own):
         sd = np.array([widths[normal.names[k]] for k in own])

@@ -1,6 +1,7 @@
 """A parameter point as the equations take it: values by name, differentiated by those that a recording knows."""
 
 from collections.abc import Callable, Collection, Mapping
+from copy import copy
 
 import numpy as np
 
@@ -73,3 +74,11 @@ class State:
 
         self.rec, self.p = rec, point
         quantities.fill(self)
+
+    def at(self, point: Point) -> "State":
+        """The same quantities without their derivatives, for terms at another point."""
+        out = copy(self)
+        out.p = point
+        for name in ("current", "k", "conducting"):
+            setattr(out, name, [Dual(x.value) for x in getattr(self, name)])
+        return out

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .acquisition import true_currents
-from .dual import Dual, value_of
+from .dual import Dual, Number, value_of
 from .point import State, effect_name
 from .shape import trapezoid_at, trapezoid_swept
 from .terms import with_hook
@@ -48,24 +48,35 @@ def _angles(state: State) -> None:
     per = 1.0 / (poles * rec.interval)
     for j in range(3):
         low, high = poles * rec.before - rec.axis[j], poles * rec.angle - rec.axis[j]
-        state.swept.append(_mean_shape(state, low, high, shift, ramp) * per)
+        state.swept.append(_mean_shape(state, low, high, shift, ramp, True) * per)
         # what effects make of it is taken of a smoothed angle, whose noise is not that of the residual
         calm_low, calm_high = poles * rec.calm_before - rec.axis[j], poles * rec.calm - rec.axis[j]
-        state.regressor.append(_mean_shape(state, calm_low, calm_high, shift, ramp) * per)
+        state.regressor.append(_mean_shape(state, calm_low, calm_high, shift, ramp, True) * per)
         state.conducting.append(_conducting_shape(state, np.minimum(low, high), np.maximum(low, high), shift, ramp))
 
 
-def _mean_shape(state: State, low, high, shift, ramp) -> Dual:
-    """Integral of f from low to high (electrical rad), measured angles."""
+def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> Dual:
+    """Integral of f from low to high (electrical rad), measured angles.
+
+    ``joined``: the first interval ends where it begins, and each of the others begins where the one before ends.
+    """
     off, r = float(value_of(shift)), float(value_of(ramp))
-    F1, dr1 = trapezoid_swept(low - off, r)
     F2, dr2 = trapezoid_swept(high - off, r)
-    f1, f2 = trapezoid_at(low - off, r)[0], trapezoid_at(high - off, r)[0]
+    F1, dr1 = (_before(F2), _before(dr2)) if joined else trapezoid_swept(low - off, r)
+    f1: Number = 0.0
+    f2: Number = 0.0
+    if isinstance(shift, Dual) and shift.slopes:
+        at_end = trapezoid_at(high - off, r)[0]
+        f1, f2 = _before(at_end) if joined else trapezoid_at(low - off, r)[0], at_end
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
         of = state.p.of(effect_name(m))
         total = total + m.harmonics(of, high - off) - m.harmonics(of, low - off)
     return total
+
+
+def _before(x: np.ndarray) -> np.ndarray:
+    return np.concatenate([x[:1], x[:-1]])
 
 
 def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:

@@ -11,13 +11,12 @@ import jsonschema
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..faults import FAULT_NAMES
-from ..figures import gap as figures
 from ..figures.page import Page
 from ..gap.bench import read_bench, split_bench
 from ..gap.handover import experiment_text, write_experiment
 from ..gap.retrained import MARKS, section
-from ..gap.run import EXPERIMENT, REPORT, VERDICT, file_name, log_diagnosis, results_folder, to_json
 from ..recording import replace_atomically
+from ..written import EXPERIMENT, REPORT, VERDICT, file_name, log_diagnosis, results_folder, to_json
 from .diagnose import TELLING, TOLD, diagnose
 from .terms import TERMS
 
@@ -120,6 +119,8 @@ def _fitted(entry: Mapping[str, Any]) -> str:
 
 def _page(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) -> Page:
     """The page of one diagnosis."""
+    from ..figures import gap as figures  # what draws takes half a second to import, and the verdict does not wait
+
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):
         page.paragraph(sentence, "lead")

@@ -1,6 +1,6 @@
 """One recording as the equations take it: angles at both ends of each interval, speed, direction, what is masked."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,14 +71,15 @@ class Signals:
         slow = uniform_filter1d(self.rate, odd(3e-3 / h), mode="nearest")
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
-        level = 0.5 * np.abs(self.current).sum(axis=1)
-        step = np.abs(np.diff(level, append=level[-1:]))
+        self.level = 0.5 * np.abs(self.current).sum(axis=1)
+        step = np.abs(np.diff(self.level, append=self.level[-1:]))
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
         self.speed_step = lattice_step(self.speed_recorded)
         self.current_step = max(lattice_step(x) for x in self.current.T)
         self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
         self.solved: dict[tuple, Any] = {}
+        self._once: dict[tuple, Any] = {}
         # with their derivatives once a point is known
         self.dT: Any = self.dT_measured
         self.inertia_scale: Any = Dual(1.0)
@@ -87,6 +88,12 @@ class Signals:
         moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)
         still = int(moved[0]) if len(moved) else self.size
         return float(np.mean(self.angle[: max(1, still - 1)]))
+
+    def once(self, key: tuple, compute: Callable[[], Any]) -> Any:
+        """What does not depend on the point, computed at the first call with this key."""
+        if key not in self._once:
+            self._once[key] = compute()
+        return self._once[key]
 
     def disturbed(self, seed: int) -> "Signals":
         """A copy with a draw of the sensors' noise added once more; what is masked and along what rows lie stays."""

@@ -1,7 +1,8 @@
 """The supply sags by R times the bus current, filtered with 1 ms."""
 
 import numpy as np
-from scipy.signal import lfilter
+
+from ..first_order import followed
 
 SENTENCE = "the supply sags under load"
 FILTER = 1e-3  # s
@@ -9,5 +10,8 @@ FILTER = 1e-3  # s
 
 def sag(p, rec, current):
     """Fall of the bus voltage (V) under a bus current (A)."""
+    R = p("R")
+    if not (R.value or R.slopes):
+        return R
     decay = np.exp(-rec.interval / FILTER)
-    return p("R") * lfilter([1.0 - decay], [1.0, -decay], current)
+    return R * followed(current, 1.0 - decay, decay)

@@ -8,4 +8,7 @@ ORDER = 72
 
 def torque(p, rec):
     """Resisting torque (N m), its mean over the angle swept."""
-    return p("a") * (np.sin(ORDER * rec.middle) * np.sinc(ORDER * rec.half_sweep / np.pi))
+    a = p("a")
+    if not (a.value or a.slopes):
+        return a
+    return a * (np.sin(ORDER * rec.middle) * np.sinc(ORDER * rec.half_sweep / np.pi))

@@ -8,7 +8,10 @@ PARAMETERS = {"d_cos": (0.0, 0.0, 0.025), "d_sin": (0.0, 0.0, 0.025)}
 
 def coefficient(p, rec, j):
     """Factor of k_j."""
-    return 1.0 + p("d_cos") * np.cos(rec.middle - rec.axis[j]) + p("d_sin") * np.sin(rec.middle - rec.axis[j])
+    x, y = p("d_cos"), p("d_sin")
+    if not (x.value or x.slopes or y.value or y.slopes):
+        return 1.0
+    return 1.0 + x * np.cos(rec.middle - rec.axis[j]) + y * np.sin(rec.middle - rec.axis[j])
 
 
 def report(value, deviation):

@@ -1,7 +1,8 @@
 """The winding heats by its own loss; the loss is integrated along the measured currents."""
 
 import numpy as np
-from scipy.signal import lfilter
+
+from ..first_order import followed
 
 SENTENCE = "the winding heats by its own loss"
 PARAMETERS = {"heating_rate": (0.0, 0.0, 0.15), "Rth": (3.0, 3.0, 1.2)}
@@ -10,9 +11,11 @@ PARAMETERS = {"heating_rate": (0.0, 0.0, 0.15), "Rth": (3.0, 3.0, 1.2)}
 def heating(p, rec, loss):
     """Rise of the winding's temperature (K) from its loss (W, (sample,))."""
     rate, thermal = p("heating_rate"), p("Rth").value
+    if not (rate.value or rate.slopes):
+        return rate
 
     def rise(decay):
-        return lfilter([rec.interval], [1.0, -np.exp(-rec.interval * decay)], loss)
+        return followed(loss, rec.interval, np.exp(-rec.interval * decay))
 
     decay = max(rate.value, 0.0) / thermal
     value = rise(decay)

@@ -1,7 +1,8 @@
 """The measured speed is first-order filtered."""
 
 import numpy as np
-from scipy.signal import lfilter
+
+from ..first_order import followed
 
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
@@ -13,7 +14,7 @@ def filtered(w, interval, tau):
     if tau < SHORTEST:
         return w
     decay = np.exp(-interval / tau)
-    state = lfilter([1.0 - decay], [1.0, -decay], w)
+    state = followed(w, 1.0 - decay, decay)
     before = np.concatenate([[0.0], state[:-1]])
     return w + (before - w) * (tau / interval) * (1.0 - decay)
 
@@ -22,6 +23,8 @@ def speed(p, rec, w):
     """Recorded speed (rad/s) from the true one."""
     tau = p("tau")
     at, h = max(tau.value, 0.0), rec.interval
+    if not tau.slopes:
+        return w if at < SHORTEST else w.linear(lambda x: filtered(x, h, at), rec.size)
     step = 1e-5
     slope = (filtered(w.value, h, at + step) - filtered(w.value, h, at)) / step
     return w.linear(lambda x: filtered(x, h, at), rec.size) + tau.through(0.0, slope)

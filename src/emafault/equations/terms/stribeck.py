@@ -10,6 +10,8 @@ SHAPES = ({"a": 0.01, "log_w_s": 0.9}, {"a": 0.01, "log_w_s": 1.8}, {"a": 0.01, 
 def torque(p, rec):
     """Resisting torque (N m)."""
     a, log_w_s = p("a"), p("log_w_s")
+    if not (a.value or a.slopes or log_w_s.slopes):
+        return a
     x = np.abs(rec.speed) / np.exp(np.clip(log_w_s.value, -1.0, 4.0))
     value = rec.direction * np.exp(-x)
     return a * value + log_w_s.through(0.0, a.value * value * x)
