@@ -22,6 +22,7 @@ TINY = 1e-12  # probability that counts as none
 BEAM = 4
 ADDED = 15  # units tried in addition to a set
 SWAPPED = 5  # units tried in the place of each member
+COMPLETED = 4  # leading sets that every candidate is added to in the end
 NEAR = 12.0  # log posterior within which a set is worth extending
 
 
@@ -219,6 +220,12 @@ class Search:
             for model in todo:
                 extended.add(model.choices)
                 self._extend(model)
+        for model in self.ranked()[:COMPLETED]:  # what is too small to be seen has its prior odds, and is not left out
+            inside = tuple((c.unit, c.variant) for c in model.choices)
+            widths = {(c.unit, c.variant): c.width for c in model.choices}
+            for m in self.candidates:
+                if m[0] not in {u for u, _ in inside} and np.isfinite(self.log_prior((*inside, m))):
+                    self.fit((*inside, m), widths)
         return self.ranked()
 
     def ranked(self) -> list[Model]:
