@@ -4,7 +4,7 @@ import numpy as np
 
 from ..actuator.compiled import compiled
 
-LONGEST = 5e-5  # s, of a step of the integration
+LONGEST = 2e-5  # s, of a step of the integration
 
 
 @compiled
@@ -18,12 +18,16 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
     position, torque = np.empty(n), np.empty(n)
     steps = int(np.ceil(interval / LONGEST))
     h = interval / steps
-    x, v, start = 0.0, 0.0, gear[0]
+    x, v, start, slope = 0.0, 0.0, gear[0], 0.0
     for m in range(n):
-        rate = (gear[m] - start) / interval
+        # the gear's motion between samples: the cubic through both, with the slopes of their neighbours' secants
+        step, end = gear[m] - start, 0.5 * (gear[min(m + 1, n - 1)] - start)
+        bend, turn = 3.0 * step - 2.0 * slope - end, slope + end - 2.0 * step
         total = 0.0
         for k in range(steps):
-            g = start + (k + 0.5) * h * rate
+            s = (k + 0.5) / steps
+            g = start + s * (slope + s * (bend + s * turn))
+            rate = (slope + s * (2.0 * bend + 3.0 * s * turn)) / interval
             gap = g - x
             side = 1.0 if gap > 0.5 * play else (-1.0 if gap < -0.5 * play else 0.0)
             stiffness, damping = (K, C) if side != 0.0 else (0.0, 0.0)
@@ -37,6 +41,6 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
             x += h * middle
             v = 2.0 * middle - v
             total += push
-        start = gear[m]
+        start, slope = gear[m], end
         position[m], torque[m] = x, total / steps
     return position, torque
