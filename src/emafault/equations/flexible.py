@@ -4,7 +4,7 @@ import numpy as np
 
 from ..actuator.compiled import compiled
 
-LONGEST = 2e-5  # s, of a step of the integration
+LONGEST = 5e-5  # s, of a step of the integration
 
 
 @compiled
