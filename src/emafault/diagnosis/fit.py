@@ -17,6 +17,7 @@ FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 CARRYING = 6  # units that carry their own form
+OWN_SHARES = (1.0, 0.2)  # of the largest own form: as far from the library's as a form is, or near it
 STILL = 0.3  # prior standard deviations by which the point may still move
 REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
@@ -300,8 +301,9 @@ class Bench:
                     np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain
-                if len(own):
-                    out[unit.id, v + OTHER_FORM] = replace(plain, extra=own, extra_sd=np.full(len(own), OWN_FORM))
+                for k, share in enumerate(OWN_SHARES if len(own) else (), start=1):
+                    own_sd = np.full(len(own), share * OWN_FORM)
+                    out[unit.id, v + k * OTHER_FORM] = replace(plain, extra=own, extra_sd=own_sd)
         left: dict[str, tuple[list[int], list[int]]] = {}
         for k, n in enumerate(reduced.names):
             if n.startswith("remainder."):

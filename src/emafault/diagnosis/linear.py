@@ -9,7 +9,7 @@ from .evidence import Definite, Normal, factored
 from .model import Block
 from .whitening import OUTLIER, autoregression, filtered, products, whiten
 
-OWN = slice(1, 14)  # functions that an effect's own form is made of
+OWN = slice(0, 14)  # functions of an own form; the first is constant, for it may differ between equations
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise

@@ -16,7 +16,7 @@ FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
-OTHER_FORM = 10  # added to a variant's number where the unit takes a form of its own beside the library's
+OTHER_FORM = 10  # added to a variant's number, once or twice, where the unit takes a form of its own, far or near
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 TINY = 1e-12  # probability that counts as none
 BEAM = 4
@@ -203,7 +203,7 @@ class Search:
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
-        value += own * np.log(OTHER_FORM_PRIOR) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
+        value += own * np.log(0.5 * OTHER_FORM_PRIOR) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search

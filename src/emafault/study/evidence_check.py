@@ -227,7 +227,7 @@ def searched(bench: LinearBench, normal: Normal) -> tuple[Search, np.ndarray]:
     for (unit, variant), c in bench.candidates.items():
         if variant >= OTHER_FORM:
             best = search.ranked()[0]
-            model = best if unit in best.units else search.fit(((unit, variant - OTHER_FORM),))
+            model = best if unit in best.units else search.fit(((unit, variant % OTHER_FORM),))
             k = c.index[0]
             scale[c.extra] = (model.deviations[reduced.names[k]] - reduced.fixed[k]) / (SIZE * c.sd[0])
     reduced = replace(reduced, M=reduced.M * np.outer(scale, scale), b=reduced.b * scale)
