@@ -157,8 +157,8 @@ def correct(
     rows = _weighed(whiten(block.bands, block.usable, raw), weights)
     noise = (rows**2).sum(axis=0)
     power = np.diag(white.gram)[changed]
-    most = np.where(np.array(changed) == last, 1.0, np.sqrt(MOST_NOISE * power / np.maximum(noise, 1e-300)))
-    rows *= np.minimum(1.0, most)
+    largest = np.where(np.array(changed) == last, np.inf, MOST_NOISE * power)
+    rows *= np.sqrt(np.where(noise > largest, largest, 1.0) / np.where(noise > largest, noise, 1.0))
     misfit = white.gram[-1, -1]  # the same for all hypotheses
     white.gram[np.ix_(changed, changed)] -= rows.T @ rows
     white.own = misfit - float(white.gram[-1, -1])
