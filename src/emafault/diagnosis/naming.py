@@ -34,6 +34,7 @@ class Reading:
 
 def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str] = ()) -> Reading:
     """Read a posterior; effects ``observed`` for certain belong to every set."""
+    units = list(units)
     kind = {u.id: u.kind for u in units}
     weights = posterior(models)
     inclusion: dict[str, float] = {e: 1.0 for e in observed}
@@ -52,7 +53,8 @@ def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str]
         else:
             empty += float(w)
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
-    groups = _groups(models, weights, [e for e in inclusion if kind.get(e) in LISTED and e not in named], inclusion)
+    open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
+    groups = _groups(models, weights, open_, inclusion, {u.id: u.equations for u in units})
     forms = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e) == "form"))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
@@ -71,14 +73,19 @@ def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str]
     return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, verdict)
 
 
-def _groups(models, weights, effects, inclusion) -> tuple[tuple[str, ...], ...]:
-    """Smallest sets of effects of which exactly one is included with probability ``NAMED`` or more."""
+def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, ...], ...]:
+    """Smallest sets of effects of which exactly one is included with probability ``NAMED`` or more.
+
+    Only effects that act in a common equation can be taken for one another.
+    """
     likely = sorted((e for e in effects if inclusion[e] >= 0.02), key=lambda e: -inclusion[e])[:8]
     units = [set(m.units) for m in models]
     out: list[tuple[str, ...]] = []
     used: set[str] = set()
     for size in range(2, MEMBERS + 1):
         for group in combinations(likely, size):
+            if not all(_meet(equations[a], equations[b]) for a, b in combinations(group, 2)):
+                continue
             if used & set(group) or (inclusion[group[0]] > 0.0 and sum(inclusion[e] for e in group) < NAMED):
                 continue
             one = sum(float(w) for u, w in zip(units, weights, strict=True) if len(u & set(group)) == 1)
@@ -86,3 +93,8 @@ def _groups(models, weights, effects, inclusion) -> tuple[tuple[str, ...], ...]:
                 out.append(tuple(sorted(group)))
                 used |= set(group)
     return tuple(out)
+
+
+def _meet(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Whether two effects act in a common equation; that of one phase is one of the electrical ones."""
+    return any(a == b or a.startswith(f"{b}_") or b.startswith(f"{a}_") for a in one for b in other)
