@@ -32,8 +32,13 @@ class Reading:
     verdict: str
 
 
-def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str] = ()) -> Reading:
-    """Read a posterior; effects ``observed`` for certain belong to every set."""
+def read(
+    models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str] = (), one_equation: bool = True
+) -> Reading:
+    """Read a posterior; effects ``observed`` for certain belong to every set.
+
+    ``one_equation``: whether only effects that act in a common equation may be a group.
+    """
     units = list(units)
     kind = {u.id: u.kind for u in units}
     weights = posterior(models)
@@ -54,7 +59,7 @@ def read(models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str]
             empty += float(w)
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
-    groups = _groups(models, weights, open_, inclusion, {u.id: u.equations for u in units})
+    groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})
     forms = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e) == "form"))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])

@@ -101,7 +101,7 @@ def fitted(recorded: Recorded, machine: Machine) -> Fitted:
     """Fit the recordings that are open."""
     bench = MeasuredBench(recorded, list(recorded.rows))
     fit = bench.fit()
-    return Fitted(recorded, bench, fit, read(fit.models, fit.search.units.values(), tuple(machine.observed)))
+    return Fitted(recorded, bench, fit, read(fit.models, fit.search.units.values(), tuple(machine.observed), False))
 
 
 def diagnose(machine: Machine, experiments: bool = True) -> Diagnosed:
