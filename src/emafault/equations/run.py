@@ -25,6 +25,7 @@ PROCESSES = 2
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
 MOST = 8  # sets in the table
+TOLD_OF = 0.01  # probability from which a set behind the first has its parameters told
 
 
 def diagnose_folder(
@@ -139,8 +140,8 @@ def _page(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str)
     page.figure("which", figures.draw_ranking(_ranked(verdict)), "Probabilities are exclusive and sum to one.")
     rows = [
         [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
-        for e in verdict["which"][:MOST]
-        if e.get("parameters")
+        for m, e in enumerate(verdict["which"][:MOST])
+        if e.get("parameters") and (m == 0 or e["probability"] >= TOLD_OF)
     ]
     if rows:
         page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
