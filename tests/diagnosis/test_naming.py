@@ -1,0 +1,63 @@
+"""Groups, the hole in a calibration effect's prior, and names that the held-out recordings contradict."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.evidence import Reduced
+from emafault.diagnosis.model import Parameter, Unit, Variant
+from emafault.diagnosis.naming import read
+from emafault.diagnosis.search import Candidate, Choice, Model, Search
+from emafault.equations import held_out
+
+
+def unit(name, *equations, kind="structural"):
+    return Unit(name, kind, equations, [Variant([Parameter(name, 0.0, 0.0, 1.0)])])
+
+
+def model(log_posterior, *effects):
+    return Model(tuple(Choice(e, 0, 1.0) for e in effects), log_posterior, log_posterior, {}, {})
+
+
+@pytest.mark.parametrize(("equation", "one_equation", "grouped"), [
+    ("torque", True, True), ("control", True, False), ("control", False, True),
+])  # fmt: skip
+def test_only_what_acts_in_a_common_equation_is_a_group(equation, one_equation, grouped):
+    units = [unit("load", "torque"), unit("other", equation)]
+    found = read([model(0.0, "load"), model(0.0, "other"), model(-9.0)], units, (), one_equation)
+    assert found.groups == ((("load", "other"),) if grouped else ())
+
+
+def log_evidence(tolerances, *hole):
+    """Of a calibration effect over no effect, of a unit that many tolerances off, with a hole in its prior or none."""
+    within, information = 0.1, 1e5  # of the wide prior
+    # the tolerance is a nuisance with the very same column, marginalised
+    known = information / (1.0 + information * within**2)
+    reduced = Reduced(["scale+"], np.array([[known]]), np.array([known * tolerances * within]), 0.0, np.zeros(1))
+    candidate = Candidate(
+        np.zeros(1, int), np.zeros(1), np.ones(1), np.zeros(1, int), (1.0,), ["scale+"],
+        within * np.array(hole), within * np.ones(len(hole)),
+    )  # fmt: skip
+    search = Search(reduced, [unit("scale", "torque", kind="calibration")], {("scale", 0): candidate})
+    return search.fit((("scale", 0),)).log_likelihood - search.fit(()).log_likelihood
+
+
+def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
+    assert log_evidence(2.0, 4.0) < log_evidence(2.0) - 2.0
+    assert log_evidence(6.0, 4.0) == pytest.approx(log_evidence(6.0), abs=0.5)
+    assert log_evidence(6.0, 4.0) > 10.0
+
+
+def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch):
+    everything = [model(0.0, "load"), model(-50.0)]
+
+    search = SimpleNamespace(fit=lambda members: model(-2.0))
+    explored = SimpleNamespace(models=[model(0.0, "load"), model(-2.0)], search=search)
+    misfit = {("load",): 130.0, (): 100.0}
+    monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
+    kept, ratios = held_out.held_to_account(everything, ["load"], None, None, explored)
+    assert ratios == {"load": -15.0} and kept[0].units == ()
+    misfit["load",] = 80.0
+    kept, ratios = held_out.held_to_account(everything, ["load"], None, None, explored)
+    assert ratios == {"load": 10.0} and kept[0].units == ("load",)
