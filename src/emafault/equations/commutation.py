@@ -14,7 +14,7 @@ from .terms import with_hook
 
 EDGE = np.pi / 6.0
 REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors may move it by
-PASSING = 0.3  # of the time in which a current passes over, that it is uncertain by, as rows of effect-free benches scatter
+PASSING = 0.3  # of the time in which a current passes over, by which it scatters on effect-free benches
 LONGEST = 0.35  # of an interval, that a current may take to pass over
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
