@@ -5,8 +5,10 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from .evidence import Reduced
-from .fit import Bench
+from .fit import Bench, Inserted, is_parameter
 from .linear import White, assemble, compressed, white_rows
+from .linearisation import SETTINGS
+from .model import Block
 
 STEPS = 1  # of a refit of what belongs to a recording alone
 PLACEBOS = 20
@@ -24,10 +26,17 @@ class Ladder:
         self.parameters, self.carried = bench.parameters, bench.carried
         self.nuisances = set(bench.nuisances)
 
-    def blocks(self, values: Mapping[str, float], remainders: bool = False, also: Collection[str] = ()) -> list[White]:
+    def blocks(
+        self,
+        values: Mapping[str, float],
+        remainders: bool = False,
+        also: Collection[str] = (),
+        inserted: Inserted | None = None,
+    ) -> list[White]:
         """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked.
 
-        ``also`` names parameters of the model, of which those of a recording are refitted too.
+        ``also`` names parameters of the model, of which those of a recording are refitted too; ``inserted`` takes the
+        remainders and own forms of a fitted set out of what is left.
         """
         out: list[White] = []
         for recording in self.recordings:
@@ -39,7 +48,7 @@ class Ladder:
             for step in range(STEPS + 1):
                 last = step == STEPS
                 whites = [
-                    compressed(b, *white_rows(b, free, remainders and last), weights.get(b.equation))
+                    compressed(b, *self._rows(b, free, remainders and last, inserted), weights.get(b.equation))
                     for b in self.machine.blocks(mine, recording, wanted=free)
                 ]
                 if last:
@@ -53,6 +62,20 @@ class Ladder:
                 for n, d in zip(free, sd * np.linalg.solve(A, right), strict=True):
                     mine[n] += float(d)
         return out
+
+
+    @staticmethod
+    def _rows(
+        block: Block, free: Sequence[str], remainders: bool, inserted: Inserted | None
+    ) -> tuple[list[str], np.ndarray]:
+        if inserted is None:
+            return white_rows(block, free, remainders)
+        left = any(n.startswith(f"remainder.{block.equation}.") for n in inserted.beside)
+        own = inserted.own if block.equation not in SETTINGS else None
+        names, found = white_rows(block, free, left, own)
+        found[:, -1] += found[:, :-1] @ np.array([inserted.beside.get(n, 0.0) for n in names])
+        kept = [k for k, n in enumerate(names) if is_parameter(n)]
+        return [names[k] for k in kept], np.ascontiguousarray(found[:, [*kept, -1]])
 
 
 def rms(whites: Sequence[White]) -> float:

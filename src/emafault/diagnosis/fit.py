@@ -44,6 +44,19 @@ class Fit:
     search: Search
 
 
+@dataclass
+class Inserted:
+    """A fitted set as a model of other recordings: all values, and what stands beside them.
+
+    ``beside``: coefficients of remainders and own forms by column; ``own``: sizes of the units that carry their own
+    form.
+    """
+
+    values: dict[str, float]
+    beside: dict[str, float]
+    own: dict[str, dict[str, float]]
+
+
 class Bench:
     """Recordings of one machine under one linearised model.
 
@@ -190,13 +203,14 @@ class Bench:
         nothing = search.fit(())
         alone = [search.fit((m,)) for m in search.candidates if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM]
         good = [m for m in alone if m.log_posterior > nothing.log_posterior]
-        before = set(self.sizes)
+        before = self.sizes
+        self.sizes = {}
         for model in [search.ranked()[0], *sorted(good, key=lambda m: -m.log_posterior)]:
             for choice in model.choices:
                 if len(self.sizes) < CARRYING and self._kind(choice.unit) in LISTED and choice.unit not in self.sizes:
                     names = self.names_of(choice)
                     self.sizes[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
-        return set(self.sizes) != before
+        return not set(self.sizes) <= set(before)
 
     def names_of(self, choice: Choice) -> list[str]:
         """Columns of a unit's variant at the present point."""
@@ -301,9 +315,9 @@ class Bench:
                     np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain
-                for k, share in enumerate(OWN_SHARES if len(own) else (), start=1):
-                    own_sd = np.full(len(own), share * OWN_FORM)
-                    out[unit.id, v + k * OTHER_FORM] = replace(plain, extra=own, extra_sd=own_sd)
+                for k, (share, inside) in enumerate(self._own_kinds(reduced, own), start=1):
+                    own_sd = np.full(len(inside), share * OWN_FORM)
+                    out[unit.id, v + k * OTHER_FORM] = replace(plain, extra=inside, extra_sd=own_sd)
         left: dict[str, tuple[list[int], list[int]]] = {}
         for k, n in enumerate(reduced.names):
             if n.startswith("remainder."):
@@ -311,6 +325,11 @@ class Bench:
         for equation, kinds in left.items():
             # the same in all recordings, or another in each
             each = [np.array(k) for k in kinds if k]
+            if kinds[0]:
+                of = self.machine.families(equation) if hasattr(self.machine, "families") else ()
+                where = {k: reduced.names[k].split(".")[2:] for k in kinds[0]}
+                for family in of:
+                    each.append(np.array([k for k, (d, f) in where.items() if (int(d), int(f)) in family]))
             unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])] * len(each))
             self.remainders.setdefault(unit.id, unit)
             for v, index in enumerate(each):
@@ -319,6 +338,20 @@ class Bench:
                     [reduced.names[k] for k in index],
                 )  # fmt: skip
         return [*self.units, *self.remainders.values()], out
+
+    def _own_kinds(self, reduced: Reduced, own: np.ndarray) -> list[tuple[float, np.ndarray]]:
+        """Share of the largest own form and columns of each kind of own form: along every coordinate, or along one."""
+        if not len(own):
+            return []
+        every = [own]
+        where = {k: reduced.names[k].split(".")[2:] for k in own.tolist()}
+        if hasattr(self.machine, "families"):
+            equations = {e for e, _ in where.values()}
+            of = {e: self.machine.families(e) for e in equations}
+            every.append(np.array([k for k, (_, f) in where.items() if f == "0"], int))  # by equation
+            for n in range(len(next(iter(of.values())))):
+                every.append(np.array([k for k, (e, f) in where.items() if (0, int(f)) in of[e][n]], int))
+        return [(share, inside) for inside in every for share in OWN_SHARES]
 
     def _tolerance(self, p: Parameter) -> float:
         """Tolerance of the quantity that a parameter is beyond, as a share of the parameter's prior."""
@@ -430,11 +463,12 @@ class Bench:
         renewed: tuple[str, ...] = ()
         for _ in range(rounds):
             best = search.ranked()[0]
-            if self._step(best, normal) < STILL:
+            more = remainders and self._carry_own_forms(search)
+            if self._step(best, normal) < STILL and not more:
                 break
             self.settle(best, normal)
             # weights are those of the first look at a set: no hypothesis gains by what it leaves
-            whites = self.linearise(renew=best.units != renewed)
+            whites = self.linearise(renew=more or best.units != renewed)
             renewed = best.units
             normal = self.normal(whites)
             search = self._search(normal, remainders)
@@ -481,6 +515,19 @@ class Bench:
         found, at_point = self._fitted(model)
         self.move(found, at_point)
         return found
+
+    def inserted(self, model: Model, normal: Normal) -> Inserted:
+        """A set at its own optimum, where the point is left as it was; ``normal`` of the present point."""
+        kept = dict(self.point), set(self.on), dict(self.sizes)
+        found = self.settle(model, normal)
+        values = self.values()
+        own = {
+            u: {self.parameters[n].alias or n: d for n, d in sizes.items()}
+            for u, sizes in self.sizes.items()
+            if u in found.units
+        }
+        self.point, self.on, self.sizes = kept
+        return Inserted(values, {n: d for n, d in found.deviations.items() if not is_parameter(n)}, own)
 
     def _fitted(self, model: Model, corrected: bool = True) -> tuple[Model, Normal]:
         """A set fitted by the linear model of the present point, and that model; its members' widths stay."""

@@ -203,7 +203,7 @@ class Search:
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
-        value += own * np.log(0.5 * OTHER_FORM_PRIOR) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
+        value += own * np.log(OTHER_FORM_PRIOR / 12.0) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search

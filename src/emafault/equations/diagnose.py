@@ -20,7 +20,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..recording import Recording
-from .held_out import held_to_account, values_at
+from .held_out import held_to_account
 from .machine import FAULTS, ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import told
@@ -149,7 +149,7 @@ def _diagnosed(
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
-    after_values = values_at(bench, fit, best)
+    after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
@@ -372,16 +372,16 @@ def _shrinks(
         return {"signal": None, "features": None, "fault_vector": None}
     ladder, explored, fit, _ = held_out
     reading = read(fit.models, fit.search.units.values())
-    told = reading.named or reading.forms or reading.groups
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
     null = _null(explored)
     recalibrated = {**off, **null.values()}
-    after = {**recalibrated, **values_at(explored, fit, model)} if told else recalibrated
+    inserted = explored.inserted(model, fit.normal)
+    after = {**recalibrated, **inserted.values}
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
-    mine = [n for n in model.deviations if is_parameter(n)] if told else []
-    best = ladder.blocks(after, also=mine)
+    mine = [n for n in model.deviations if is_parameter(n)]
+    best = ladder.blocks(after, also=mine, inserted=inserted)
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)

@@ -1,6 +1,6 @@
 """Whether what was named holds on the recordings that took no part in naming it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,9 +47,9 @@ def held_to_account(
 
 def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
     """Sum of the squared whitened residual on the confirm recordings, at a set's fit to the explored ones."""
-    values = values_at(bench, fit, model)
-    blocks = ladder.blocks(values, also=[n for n in model.deviations if is_parameter(n)])
-    return float(sum(w.gram[-1, -1] for w in blocks))
+    inserted = bench.inserted(model, fit.normal)
+    also = [n for n in model.deviations if is_parameter(n)]
+    return float(sum(w.gram[-1, -1] for w in ladder.blocks(inserted.values, also=also, inserted=inserted)))
 
 
 def _log_odds(models: Sequence[Model], effect: str) -> float:
@@ -59,12 +59,3 @@ def _log_odds(models: Sequence[Model], effect: str) -> float:
     if not inside or not outside:
         return np.inf if inside else -np.inf
     return float(logsumexp(inside) - logsumexp(outside))
-
-
-def values_at(bench: Bench, fit: Fit, model: Model) -> Mapping[str, float]:
-    """All values at a model's fit, the nuisances with it."""
-    kept = dict(bench.point), set(bench.on)
-    bench.settle(model, fit.normal)
-    out = bench.values()
-    bench.point, bench.on = kept
-    return out

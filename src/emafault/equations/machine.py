@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.linearisation import SETTINGS
 from ..diagnosis.model import Block, Parameter, Unit, Variant
 from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
@@ -26,6 +27,8 @@ GAIN_PRIOR = 0.3  # relative, of the controller's gains
 LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
 EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
+#: functions of a remainder along one coordinate: speed, current, time and temperature, angle
+ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
@@ -56,6 +59,12 @@ class ReferenceActuator:
                 full = f"{effect.id}.{name}"
                 if full not in self.parameters and effect.id not in self.effects:
                     self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
+
+    def families(self, equation: str) -> tuple[frozenset[tuple[int, int]], ...]:
+        """Functions of a remainder or an own form that go along one coordinate: (driver, function) each."""
+        if equation in SETTINGS:
+            return ()
+        return tuple(frozenset((d, f) for f in along for d in range(1)) for along in ALONG)
 
     # ---- parameters
     def _nuisances(self) -> dict[str, Parameter]:
