@@ -1,4 +1,4 @@
-"""Time and memory of ``emafault diagnose`` by the equations, over benches of several sizes that are simulated first.
+"""Time and memory of ``emafault diagnose``, over benches of several sizes that are simulated first.
 
     python benchmarks/diagnosis.py [--only 8x1 8x10] [--repeats 3] [--long] [--markdown]
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from emafault import config
 from emafault.dataset import simulate_recording
-from emafault.recording import write_recording
+from emafault.io.recording import write_recording
 
 USUAL = ("parabolic", "sine", "reversal", "ramp", "chirp", "parabolic", "sine", "reversal")
 STEPS = ("step", "parabolic", "step", "sine", "reversal", "step", "ramp", "chirp")

@@ -1,7 +1,6 @@
 """Diagnoses of benches that a fixed step simulated: is another integrator taken for an effect, or an effect missed?
 
     python benchmarks/other_integrator.py [--step 1e-6] [--sampled] [--rung T1] [--first 1060000] [--cases 31]
-        [--by simulation]
 
 Prints each verdict that is not right and how many of the detectable cases are; the seeds are those of development.
 With ``--sampled`` comparator and commutation act at the steps only.
@@ -16,13 +15,13 @@ from pathlib import Path
 from emafault import config
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.actuator.sensors import SensorNoise
-from emafault.study.blind import PATHS, diagnose_bench
+from emafault.study.blind import diagnose_bench
 from emafault.withheld.benches import simulate_truth, write_bench, write_key
 from emafault.withheld.cases import draw_case
 from emafault.withheld.verdicts import judge
 
 
-def run(rung: str, seed: int, step: float, sampled: bool, by: str, folder: Path) -> dict:
+def run(rung: str, seed: int, step: float, sampled: bool, folder: Path) -> dict:
     """Simulate, diagnose and judge one case."""
     spec = config.diagnosis_spec(config.compose())
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
@@ -30,7 +29,7 @@ def run(rung: str, seed: int, step: float, sampled: bool, by: str, folder: Path)
     write_bench(case, folder / case.name, actuator, noise, step, sampled)
     key = folder / f"{case.name}.json"
     write_key(case, key, actuator, noise, simulate_truth(case, actuator))
-    verdict = diagnose_bench(folder / case.name, actuator, noise, by, case.left_out)
+    verdict = diagnose_bench(folder / case.name, actuator, noise, case.left_out)
     return judge(json.loads(key.read_text()), verdict)
 
 
@@ -41,9 +40,8 @@ def main() -> None:
     parser.add_argument("--rung", default="T1", choices=("T0", "T1"))
     parser.add_argument("--first", type=int, default=1_060_000)
     parser.add_argument("--cases", type=int, default=31)
-    parser.add_argument("--by", default="simulation", choices=PATHS)
     options = parser.parse_args()
-    given = options.step, options.sampled, options.by
+    given = options.step, options.sampled
     seeds = range(options.first, options.first + options.cases)
     with tempfile.TemporaryDirectory() as scratch, ProcessPoolExecutor(2) as pool:
         every = [pool.submit(run, options.rung, seed, *given, Path(scratch)) for seed in seeds]

@@ -9,7 +9,7 @@ import pytest
 
 from emafault.cli import main
 from emafault.faults import FAULT_NAMES
-from emafault.recording import read_recording
+from emafault.io.recording import read_recording
 
 FAULT = (0.0375, 0.0504, 0.0507, 0.0059, -2.8e-5, -4.0)
 

@@ -11,9 +11,9 @@ import pytest
 from emafault import config, dataset
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.errors import InputError
+from emafault.io.atomic import replace_atomically
 from emafault.progress import one_line_errors
 from emafault.reconstruction import reconstruct
-from emafault.recording import replace_atomically
 from emafault.study.features import read_features, reconstruct_features
 
 RUNS = 11

@@ -333,28 +333,18 @@ def withheld_draws() -> list[str]:
 
 
 def _withheld_draw(draw: str) -> dict[str, Any]:
-    """A draw of conf/withheld; one that is the ``same_as`` another has its cases, and differs in what it says itself.
-
-    Raises
-    ------
-    InputError : a path of the diagnosis that there is not
-    """
-    read: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore
-    if "same_as" in read:
-        read = _withheld_draw(read["same_as"]) | read
-    if read["by"] not in ("equations", "simulation"):
-        raise InputError(f"withheld.{draw}.by: got '{read['by']}', accepted are equations and simulation")
-    return read
+    """A draw of conf/withheld."""
+    return OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore[return-value]
 
 
 def check_draws() -> None:
-    """Refuse draws of blind cases that share a case; one that is the ``same_as`` another is no draw of its own.
+    """Refuse draws of blind cases that share a case.
 
     Raises
     ------
     InputError : naming two draws, the rung and the seeds that they share
     """
-    draws = {draw: read for draw in withheld_draws() if "same_as" not in (read := _withheld_draw(draw))}
+    draws = {draw: _withheld_draw(draw) for draw in withheld_draws()}
     for (one, first), (other, second) in combinations(draws.items(), 2):
         for rung in first["cases"].keys() & second["cases"].keys() - {"T3"}:
             low = max(_of_rung(read["first_seed"], rung) for read in (first, second))
@@ -376,7 +366,7 @@ def withheld_jobs(draw: str) -> list[tuple[str, int]]:
 
 
 def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
-    """What one job of blind cases reads: its seeds, the path of the diagnosis, the actuator and the sensors.
+    """What one job of blind cases reads: its seeds, the actuator and the sensors.
 
     ``again`` are those of T1 that T3 diagnoses too: whole rounds of the effects, spread over the draw. ``told`` are
     diagnosed a second time by a library of the truth alone, ``rivals`` have the distance to the nearest one computed.
@@ -395,7 +385,7 @@ def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
     for name in ("told", "rivals"):
         every = read.get(name, {}).get(rung, 0)
         seeds[name] = [seed for seed in range(first, last) if every and (seed - origin) % every == 0]
-    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds, "by": read["by"]})
+    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
 
 
 def _evidence() -> dict[str, Any]:

@@ -17,8 +17,9 @@ from .actuator.parameters import ActuatorParameters, make_runs
 from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
+from .io.atomic import replace_atomically, write_text
+from .io.recording import PHASES, VARIABLES, Recording
 from .progress import progress, say
-from .recording import PHASES, VARIABLES, Recording, replace_atomically
 
 BLOCK = 25  # runs simulated, written and read at a time
 CHUNK_CACHE = 2**20  # bytes a variable; chunks are written and read whole, the library's 16 MB would only fill up
@@ -181,7 +182,7 @@ def compile_simulation(actuator: Mapping[str, Any], output: str | Path) -> None:
     parameters = ActuatorParameters(**actuator)
     command = command_positions("ramp", {"speed": 0.1}, 0.02, parameters.control_period)
     simulate(make_runs(parameters, np.zeros((1, 6))), command, 0.02, 2e-4)
-    replace_atomically(Path(output), lambda temporary: temporary.write_text("compiled\n"))
+    write_text(output, "compiled\n")
 
 
 def _create(file, spec: Mapping[str, Any], runs: int, samples: int) -> None:

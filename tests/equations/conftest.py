@@ -10,7 +10,7 @@ from emafault.actuator.sensors import SensorNoise, measure
 from emafault.actuator.simulate import simulate, time_axis
 from emafault.equations.machine import ReferenceActuator
 from emafault.equations.signals import Signals
-from emafault.recording import Recording
+from emafault.io.recording import Recording
 
 SPEC = config.diagnosis_spec(config.compose())
 ACTUATOR = ActuatorParameters(**SPEC["actuator"])

@@ -7,8 +7,8 @@ import pytest
 
 from emafault.cli import main
 from emafault.config import compose, retraining_spec
-from emafault.equations.run import SCHEMA_FILE
-from emafault.recording import write_recording
+from emafault.io.recording import write_recording
+from emafault.reporting.written import SCHEMA_FILE
 from emafault.study.retrain import retrain_network
 
 from .test_diagnose import bench

@@ -10,9 +10,9 @@ from emafault.actuator.sensors import measure
 from emafault.actuator.simulate import simulate, time_axis
 from emafault.errors import InputError
 from emafault.identification.closed_form import forward, inverse
+from emafault.io.recording import Recording
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.calibration import calibrate, calibrate_recordings
-from emafault.recording import Recording
 
 from .conftest import ACTUATOR, LEVELS, NOISE
 

@@ -16,7 +16,7 @@ from emafault.actuator.sensors import SensorNoise
 from emafault.config import reference_actuator, withheld_jobs, withheld_spec
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
-from emafault.recording import read_recording
+from emafault.io.recording import read_recording
 from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth, write_bench
 from emafault.withheld.cases import RUNGS, STRATA, case_from_dict, draw_case, plain_twin, stratum_of
 from emafault.withheld.detectability import Detector
@@ -67,7 +67,7 @@ def test_what_is_left_out_on_t3_is_in_the_bench_of_t1():
     assert len({draw_case(rung, 137).noise_seed for rung in RUNGS}) == len(RUNGS) - 1
 
 
-@pytest.mark.parametrize("draw", ["standard", "development", "smallest"])
+@pytest.mark.parametrize("draw", ["standard", "smallest"])
 def test_t3_takes_whole_rounds_of_t1_spread_over_the_draw(draw):
     specs = [withheld_spec(draw, rung, n)["seeds"] for rung, n in withheld_jobs(draw)]
     shown = [seed for s in specs if s["rung"] == "T1" for seed in range(s["first"], s["last"])]

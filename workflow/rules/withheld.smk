@@ -1,4 +1,4 @@
-# The withheld check: blind cases, their diagnoses, the scoreboard; and the calibration of the probabilities on a draw of its own.
+# The withheld check: blind cases, their diagnoses, the scoreboard.
 
 
 wildcard_constraints:
@@ -25,7 +25,7 @@ rule diagnose_cases:
 rule score_cases:
     input:
         batches=withheld_batches,
-        measured=rules.diagnose_measured.output.withheld,
+        measured=rules.diagnose_machines.output.withheld,
         where=rules.prepare_tracking.output,
     output:
         report=f"{WITHHELD}/{{draw}}/scoreboard.html",
@@ -43,34 +43,10 @@ rule score_cases:
         "../scripts/score_cases.py"
 
 
-rule calibrate_diagnosis:
-    input:
-        lambda wildcards: [
-            f"{WITHHELD}/development/{rung}_{n}.json" for rung, n in configuration.withheld_jobs("development")
-        ],
-    output:
-        f"{WITHHELD}/calibration.json",
-    log:
-        f"{RESULTS}/logs/withheld/calibrate_diagnosis.log",
-    resources:
-        mem_mb=1000,
-        runtime=5,
-    params:
-        code=code("calibrate_diagnosis"),
-    script:
-        "../scripts/calibrate_diagnosis.py"
-
-
 rule withheld:
     """The standard scoreboard."""
     input:
         f"{WITHHELD}/standard/scoreboard.html",
-
-
-rule withheld_by_simulation:
-    """The standard scoreboard's benches, diagnosed against simulated recordings."""
-    input:
-        f"{WITHHELD}/standard_by_simulation/scoreboard.html",
 
 
 rule withheld_full:
@@ -89,9 +65,3 @@ rule withheld_smallest:
     """A handful of cases, for the tests."""
     input:
         f"{WITHHELD}/smallest/scoreboard.html",
-
-
-rule calibration:
-    """Calibrate the probabilities of the diagnosis anew."""
-    input:
-        rules.calibrate_diagnosis.output,

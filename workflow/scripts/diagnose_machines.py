@@ -1,4 +1,4 @@
-"""Diagnose every measured set by its equations into one page."""
+"""Diagnose every measured set into one page."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ with one_line_errors(snakemake.log[0]):
     given, out = snakemake.input, snakemake.output
     diagnose_machines(
         Path(given.sets),
-        (Path(given.verdicts), Path(given.withheld)),
+        Path(given.nameplate),
         Path(out.report),
         Path(out.figures),
         Path(out.verdicts),

@@ -26,11 +26,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--experiment", metavar="NAME", help="write the fix as conf/experiment/NAME.yaml too, for snakemake to run"
     )
-    parser.add_argument(
-        "--by",
-        choices=("simulation", "equations"),
-        help="by the equations at the measured signals, or the older way, against simulated recordings (equations)",
-    )
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
 
@@ -51,20 +46,15 @@ def run(args: argparse.Namespace) -> None:
         target = config.CONF / "experiment" / f"{args.experiment}.yaml"
     spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
     tracking = not args.no_tracking
-    by = args.by or "equations"
-    if by == "equations" and args.twin == "actuator":
+    if args.twin == "actuator":
         from ..equations.run import diagnose_folder
 
         diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking)
-    elif by == "equations":
+    else:
         if target is not None:
             raise InputError("--experiment: a measured machine has no simulator that could run one")
         from ..machines.run import diagnose_file
 
         diagnose_file(args.path, args.twin, spec, args.out, args.exclude, tracking)
-    else:
-        from ..gap.run import diagnose_path
-
-        diagnose_path(args.path, spec, args.out, args.twin, args.exclude, target, tracking)
     if target is not None:
         print(f"snakemake --cores all --config experiment={Path(target).stem}")

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from pathlib import Path
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +35,8 @@ def run(args: argparse.Namespace) -> None:
     import json
 
     from ..identification.recordings import identify_recordings
-    from ..recording import read_recording, recordings_in, replace_atomically
+    from ..io.atomic import write_text
+    from ..io.recording import read_recording, recordings_in
     from .model import load_model
 
     model = load_model(args.experiment, args.method, args.results)
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> None:
     result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
     if args.json:
         text = json.dumps(result, indent=1)
-        replace_atomically(Path(args.json), lambda temporary: temporary.write_text(text + "\n"))
+        write_text(args.json, text + "\n")
     print(table(result, args.level))
     unit = f"calibrated on {len(reference)} healthy recording(s)" if reference else "taken for nominal (no --reference)"
     print(f"experiment {args.experiment}, method {model.name}, unit {unit}")

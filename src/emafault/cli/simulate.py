@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> None:
 
     from .. import config
     from ..dataset import simulate_recording
-    from ..recording import write_recording
+    from ..io.recording import write_recording
 
     fault, overrides = read_fault(args.fault)
     composed = config.compose(args.experiment, [*args.overrides, *overrides])

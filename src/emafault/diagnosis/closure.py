@@ -63,7 +63,6 @@ class Ladder:
                     mine[n] += float(d)
         return out
 
-
     @staticmethod
     def _rows(
         block: Block, free: Sequence[str], remainders: bool, inserted: Inserted | None

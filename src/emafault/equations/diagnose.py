@@ -19,7 +19,7 @@ from ..diagnosis.where import where
 from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..recording import Recording
+from ..io.recording import Recording
 from .held_out import held_to_account
 from .machine import FAULTS, ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings

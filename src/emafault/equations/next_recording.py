@@ -18,7 +18,7 @@ from ..actuator.simulate import simulate, time_axis
 from ..diagnosis.evidence import Normal
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.search import Model, Search
-from ..recording import Recording
+from ..io.recording import Recording
 from .machine import FAULTS, ReferenceActuator
 from .signals import Signals
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..recording import Recording
+from ..io.recording import Recording
 from .signals import lattice_step
 
 CHANNELS = {

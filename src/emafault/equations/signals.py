@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..recording import Recording
+from ..io.recording import Recording
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..recording import replace_atomically
+from ..io.atomic import replace_atomically
 from .network import Network
 from .training import torch_layers
 

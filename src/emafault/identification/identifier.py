@@ -11,7 +11,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..recording import replace_atomically
+from ..io.atomic import replace_atomically
 from . import closed_form
 from .intervals import ConformalIntervals
 from .network import Network

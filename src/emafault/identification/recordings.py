@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..io.recording import Recording
 from ..reconstruction import Features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
-from ..recording import Recording
 from .identifier import Identifier
 
 

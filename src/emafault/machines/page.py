@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..figures import gap as figures
-from ..figures.machines import Panel, draw_residuals
-from ..figures.page import Page
+from ..reporting import diagnosis as figures
+from ..reporting.page import Page
+from ..reporting.residuals import Panel, draw_residuals
 from .diagnose import Diagnosed
 
 MOST = 8  # sets in the table

@@ -5,18 +5,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jsonschema
-
 from ..errors import InputError
-from ..figures.page import Page
-from ..recording import replace_atomically
-from ..written import REPORT, VERDICT, file_name, log_diagnosis, results_folder, to_json
+from ..io.atomic import write_text
+from ..reporting.page import Page
+from ..reporting.written import REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder, to_json
 from .diagnose import Diagnosed, diagnose
 from .library import build, read_cases, stated
 from .page import draw, finding
-
-#: the format of every verdict, of the reference actuator's too
-SCHEMA_FILE = Path(__file__).parents[1] / "equations" / "verdict.schema.json"
 
 
 def diagnose_file(
@@ -53,13 +48,13 @@ def diagnose_file(
     found: dict[str, Diagnosed] = {}
     for case, one in machines.items():
         found[case] = diagnose(one)
-        _write(folders[case] / VERDICT, checked(found[case].verdict))
+        write_text(folders[case] / VERDICT, checked(found[case].verdict))
         print(
             "\n".join([f"{case}:", *finding(found[case].verdict)] if len(cases) > 1 else finding(found[case].verdict))
         )
     if len(cases) > 1:
         together = {c: json.loads(to_json(d.verdict)) for c, d in found.items()}
-        _write(folder / VERDICT, to_json({"bench": name, "twin": machine.name, "cases": together}))
+        write_text(folder / VERDICT, to_json({"bench": name, "twin": machine.name, "cases": together}))
         contents = Page(f"Diagnoses of {name}")
         links = "".join(f'<li><a href="{file_name(c)}/{REPORT}">{c}</a></li>' for c in cases)
         contents.parts.append(f"<ul>{links}</ul>")
@@ -70,14 +65,3 @@ def diagnose_file(
     for case, diagnosed in found.items() if track else ():
         log_diagnosis(spec["tracking"], folders[case], diagnosed.verdict)
     return {case: d.verdict for case, d in found.items()}
-
-
-def checked(verdict: Mapping[str, Any]) -> str:
-    """A verdict as written, checked against the schema of its format."""
-    text = to_json(verdict)
-    jsonschema.validate(json.loads(text), json.loads(SCHEMA_FILE.read_text()))
-    return text
-
-
-def _write(path: Path, text: str) -> None:
-    replace_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))

@@ -15,7 +15,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..identification.closed_form import ECCENTRICITY_AXES, propagate
-from ..recording import Recording
+from ..io.recording import Recording
 from .features import Features, join_features
 
 

@@ -1,4 +1,4 @@
-"""Diagnoses of blind cases, for the withheld check and for calibrating the probabilities.
+"""Diagnoses of blind cases, for the withheld check.
 
 The cases' generator and the diagnosers do not know each other; they meet here. A diagnosis sees a bench's folder and,
 on the rung that leaves an effect out, which one the library lacks; one that is told has a library of the truth alone.
@@ -6,7 +6,6 @@ on the rung that leaves an effect out, which one the library lacks; one that is 
 
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +16,14 @@ from ..actuator.sensors import SensorNoise
 from ..effects import EFFECTS
 from ..equations.diagnose import diagnose
 from ..errors import InputError
-from ..gap.bench import read_bench, split_bench
-from ..gap.decide import UNCALIBRATED, Calibration, Evidence
-from ..gap.run import diagnose_recordings, to_json
-from ..recording import replace_atomically
+from ..io.atomic import write_text
+from ..io.bench import read_bench, split_bench
+from ..reporting.written import to_json
 from ..withheld.benches import make_cases, write_key_without
 from ..withheld.cases import Case, draw_case, with_twin, without_effect
-from .curves import DETECTABLE, fit_gap, fit_right
 
-FIELDS = [f.name for f in fields(Evidence)]
-#: cases of the development draw stand above this seed, those of the scoreboard below
+#: cases looked at while developing stand above this seed, those of the scoreboards below
 DEVELOPMENT = 1_000_000
-PATHS = ("equations", "simulation")
 #: what a diagnosis may end with on data that it cannot digest
 FAILURES = (InputError, ArithmeticError, LookupError, ValueError, np.linalg.LinAlgError)
 
@@ -39,7 +34,6 @@ def run_cases(
     folder: Path,
     actuator: ActuatorParameters,
     noise: SensorNoise,
-    by: str = "equations",
     keep_benches: bool = False,
     again: Collection[int] = (),
     told: Collection[int] = (),
@@ -51,7 +45,6 @@ def run_cases(
 
     Parameters
     ----------
-    by : the path of the diagnosis, one of ``PATHS``
     again : seeds of T1 that are also diagnosed with the effect left out of the library: T3, on the same bench
     told : seeds that are also diagnosed with a library of the true effects alone: ``FOLDER/oracles/NAME``
     rivals : seeds whose keys hold the distance to the nearest rival
@@ -85,11 +78,11 @@ def run_cases(
         for path in missing:
             case, exclude = wanted[path]
             try:
-                verdict = diagnose_bench(benches[case.bench], actuator, noise, by, exclude)
+                verdict = diagnose_bench(benches[case.bench], actuator, noise, exclude)
             except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
                 verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
             text = to_json(verdict | {"bench": case.name})
-            replace_atomically(path, lambda temporary, text=text: temporary.write_text(text))
+            write_text(path, text)
         for bench in benches.values():
             if not keep_benches:
                 for file in bench.glob("*.nc"):
@@ -114,89 +107,19 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
     span = range(seeds["first"], seeds["last"])
     beside = {name: seeds[name] for name in ("again", "told", "rivals")}
-    names = run_cases(seeds["rung"], span, folder, actuator, noise, spec["by"], **beside)
+    names = run_cases(seeds["rung"], span, folder, actuator, noise, **beside)
     text = json.dumps({"folder": folder.name, "cases": names})
-    replace_atomically(output, lambda temporary: temporary.write_text(text))
-
-
-def calibrate_draw(batches: Sequence[Path], output: Path) -> None:
-    """Calibrate on the cases of a draw and write the calibration."""
-    folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    fitted, shipped = calibrate(folder, Calibration.load(UNCALIBRATED)), Calibration.load()
-    replace(fitted, addition=shipped.addition, remainder=shipped.remainder).save(output)
+    write_text(output, text)
 
 
 def diagnose_bench(
-    bench: Path,
-    actuator: ActuatorParameters,
-    noise: SensorNoise,
-    by: str = "equations",
-    exclude: Sequence[str] = (),
-) -> dict:
-    """The verdict on a bench by one of ``PATHS``, without report or next experiment.
+    bench: Path, actuator: ActuatorParameters, noise: SensorNoise, exclude: Sequence[str] = ()
+) -> dict[str, Any]:
+    """The verdict on a bench, without report or next experiment.
 
     Raises
     ------
-    InputError : an unknown path, or recordings that cannot be used
+    InputError : recordings that cannot be used
     """
     brought = read_bench(bench, actuator)
-    if by == "equations":
-        recordings = brought.recordings
-        return diagnose(brought.name, recordings, split_bench(recordings), actuator, noise, exclude).verdict
-    if by == "simulation":
-        calibration = Calibration.load()
-        return diagnose_recordings(brought, actuator, noise, exclude, calibration, whole=False, threads=1).verdict
-    raise InputError(f"by: got '{by}', accepted are {', '.join(PATHS)}")
-
-
-def calibrate(folder: Path, start: Calibration) -> Calibration:
-    """Fit the curves of probability to the verdicts of a folder of development cases and their keys.
-
-    The first curve is fitted to whether a case held a detectable gap, the second to whether the best set was right
-    among cases that did and in which the first curve sees it. What the library lacks counts as a gap where it leaves
-    more than any effect-free case does: what it leaves within that is no gap that these statistics could tell.
-    """
-    gap_rows, gap_truth, lacking, seen, right_rows, right_truth = [], [], [], [], [], []
-    for path in sorted((folder / "keys").glob("*.json")):
-        verdict_path = folder / "diagnoses" / path.stem / "diagnosis.json"
-        if not verdict_path.exists():
-            continue
-        key, verdict = json.loads(path.read_text()), json.loads(verdict_path.read_text())
-        truth = set(key["case"]["effects"])
-        distance = (key["detectability"] or {}).get("nominal", 0.0)
-        evidence = Evidence(**{name: verdict["evidence"][name] for name in FIELDS})
-        if truth and distance >= DETECTABLE and key["case"]["left_out"]:
-            lacking.append(evidence)
-        elif not truth or distance >= DETECTABLE:
-            gap_rows.append(evidence)
-            gap_truth.append(bool(truth))
-        if not verdict["evidence"]["candidates"] or not truth or distance < DETECTABLE:
-            continue
-        best = set(verdict["evidence"]["candidates"][0][0])
-        if key["case"]["left_out"] and _twins(best, truth):
-            continue  # nothing tells them apart, so there is nothing to learn from
-        right = not key["case"]["left_out"] and _names(verdict, best, truth, key["detectability"]["members"])
-        seen.append(evidence.gap_features())
-        right_rows.append(evidence.right_features())
-        right_truth.append(right)
-    noise = max((e.null_excess for e, truth in zip(gap_rows, gap_truth) if not truth), default=np.inf)
-    beyond = [e for e in lacking if e.null_excess > noise]
-    gap_rows, gap_truth = [*gap_rows, *beyond], [*gap_truth, *[True] * len(beyond)]
-    gap = fit_gap(np.array([e.gap_features() for e in gap_rows]), np.array(gap_truth), start)
-    asked = np.array(seen) @ np.array(gap) > 0.0
-    rows, truths = np.array(right_rows)[asked], np.array(right_truth)[asked]
-    curve, most = fit_right(rows, truths, start)
-    source = f"{len(gap_rows)} development cases for the first curve, {len(rows)} for the second"
-    return Calibration(gap, curve, start.addition, start.remainder, most, source)
-
-
-def _twins(one: set[str], other: set[str]) -> bool:
-    """Whether two sets are the pair of effects that are one and the same torque in any motion."""
-    return one | other == {"load_constant", "friction_asymmetry"}
-
-
-def _names(verdict: Mapping[str, Any], best: set[str], truth: set[str], members: Mapping[str, float]) -> bool:
-    """Whether the best set, or one of its group, is the truth less what nobody could have seen of it."""
-    seen = {e for e in truth if members.get(e, DETECTABLE) >= DETECTABLE}
-    sets = [set(e["effects"]) for e in verdict["which"] if e.get("group")]
-    return any(seen <= s <= truth for s in (sets or [best]))
+    return diagnose(brought.name, brought.recordings, split_bench(brought.recordings), actuator, noise, exclude).verdict

@@ -11,8 +11,8 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
 from ..identification.identifier import Identifier
+from ..io.atomic import replace_atomically
 from ..reconstruction.calibration import calibrate
-from ..recording import replace_atomically
 from .features import FeatureTable, read_features
 from .networks import HISTORY, folders, read_json, seed_folder, width_of, write_json
 

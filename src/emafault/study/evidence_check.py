@@ -33,10 +33,10 @@ from ..diagnosis.search import (
 )  # fmt: skip
 from ..equations.machine import ReferenceActuator
 from ..equations.signals import Signals, estimated_noise
-from ..figures.evidence import draw_page
-from ..gap.bench import read_bench
+from ..io.atomic import write_text
+from ..io.bench import read_bench
 from ..progress import say
-from ..recording import replace_atomically
+from ..reporting.evidence import draw_page
 from ..withheld.benches import write_bench
 from ..withheld.cases import draw_case
 from .evidence_scores import scores
@@ -454,5 +454,5 @@ def check_evidence(spec: Mapping[str, Any], report: Path, figures: Path, result:
     for kind, own in (("library", False), ("own_forms", True)):
         benches = [linear_bench(b, said["recordings"], actuator, noise, own) for b in said["benches"]]
         out[kind] = scores(run_draws(benches, said["draws"], said["samples"], said["seed"]), said["samples"], ARMS)
-    replace_atomically(Path(result), lambda temporary: temporary.write_text(json.dumps(out, indent=1) + "\n"))
+    write_text(result, json.dumps(out, indent=1) + "\n")
     draw_page(out, Path(report), Path(figures))

@@ -9,8 +9,8 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..dataset import simulate_blocks
 from ..faults import WORKED_EXAMPLE
+from ..io.atomic import replace_atomically
 from ..reconstruction import reconstruct
-from ..recording import replace_atomically
 
 CUTOFF = 300.0  # Hz, of the paper's zero-phase low-pass
 THRESHOLD = 0.5  # of k0, smaller values are dropped by the paper

@@ -11,9 +11,10 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import BLOCK, count_runs, read_blocks, sample_runs
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..io.atomic import replace_atomically
+from ..io.recording import PHASES
 from ..progress import progress
 from ..reconstruction import Features, reconstruct
-from ..recording import PHASES, replace_atomically
 
 _UNITS = {"R": "ohm", "k": "V s/rad", "L": "H", "offset": "V"}
 _SIGNALS = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle", "bus_voltage")

@@ -13,8 +13,8 @@ from ..errors import InputError
 from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
 from ..identification.search import SearchSettings, choose, run_worker, summarise
+from ..io.atomic import write_text
 from ..progress import progress, say
-from ..recording import replace_atomically
 from .features import FeatureTable, read_features
 
 HISTORY = "history.json"
@@ -23,7 +23,7 @@ HISTORY = "history.json"
 def write_json(path: str | Path, value: Any) -> None:
     """Write plain values as readable JSON, whole or not at all."""
     text = json.dumps(value, indent=1, sort_keys=True)
-    replace_atomically(Path(path), lambda temporary: temporary.write_text(text + "\n"))
+    write_text(path, text + "\n")
 
 
 def read_json(path: str | Path) -> Any:
@@ -44,7 +44,7 @@ def write_yaml(path: str | Path, value: Any) -> None:
     from omegaconf import OmegaConf
 
     text = OmegaConf.to_yaml(OmegaConf.create(value))
-    replace_atomically(Path(path), lambda temporary: temporary.write_text(text))
+    write_text(path, text)
 
 
 def width_of(faults: Mapping[str, Any]) -> np.ndarray:

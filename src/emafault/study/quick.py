@@ -13,7 +13,7 @@ from ..withheld.verdicts import listed_names
 from .blind import DEVELOPMENT, run_cases
 
 
-def look(rung: str, cases: int, folder: Path, spec: Mapping[str, Any], first: int = 0, by: str = "equations") -> dict:
+def look(rung: str, cases: int, folder: Path, spec: Mapping[str, Any], first: int = 0) -> dict:
     """Make, diagnose and score ``cases`` cases of a rung; a line each, then the scores that hold a case.
 
     Parameters
@@ -21,7 +21,6 @@ def look(rung: str, cases: int, folder: Path, spec: Mapping[str, Any], first: in
     folder : keeps keys and verdicts
     spec : ``actuator`` and ``sensors`` of a composed configuration
     first : first seed, counted from the first of development
-    by : path of the diagnosis
 
     Returns
     -------
@@ -29,7 +28,7 @@ def look(rung: str, cases: int, folder: Path, spec: Mapping[str, Any], first: in
     """
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
     for seed in range(DEVELOPMENT + first, DEVELOPMENT + first + cases):
-        for name in run_cases(rung, [seed], folder, actuator, noise, by):
+        for name in run_cases(rung, [seed], folder, actuator, noise):
             key = json.loads((folder / "keys" / f"{name}.json").read_text())
             verdict = json.loads((folder / "diagnoses" / name / "diagnosis.json").read_text())
             say(_line(seed, key, verdict))

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..figures import errors as error_figures
-from ..figures import paper as paper_figures
-from ..figures import search as search_figures
-from ..figures.page import Page
-from ..figures.style import named
+from ..reporting import errors as error_figures
+from ..reporting import paper as paper_figures
+from ..reporting import search as search_figures
+from ..reporting.page import Page
+from ..reporting.style import named
 from .networks import folders, read_json
 
 #: what the paper reports on ten fresh rows

@@ -17,13 +17,13 @@ from ..actuator.simulate import simulate
 from ..dataset import as_batch, sample_runs
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..gap.bench import read_bench
-from ..gap.retrained import show_in_report
-from ..gap.run import REPORT, VERDICT
 from ..identification.identifier import fit_identifier
+from ..io.bench import read_bench
+from ..io.recording import Recording
 from ..progress import progress, say
 from ..reconstruction import Features, join_features, reconstruct
-from ..recording import Recording
+from ..reporting.retrained import show_in_report
+from ..reporting.written import REPORT, VERDICT
 from .networks import read_json, width_of, write_json
 
 BLOCK = 25

@@ -15,7 +15,8 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import time_axis
 from ..effects import EFFECTS
-from ..recording import Recording, replace_atomically, write_recording
+from ..io.atomic import write_text
+from ..io.recording import Recording, write_recording
 from .cases import Case, case_from_dict, draw_case, is_disturbed, plain_twin, with_twin, without_effect
 from .detectability import LATTICE, Detector
 from .disturbances import FILTER, Unlisted, change, in_physics, terms_of, with_controller
@@ -139,7 +140,7 @@ def write_key(
             key["nearest_rival"] = {"effect": nearest, "distance": distances[nearest]}
     if case.unlisted:
         key["unlisted"] = [u.told(_apart(detector, plain, u, signals, actuator)) for u in case.unlisted]
-    replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(key, indent=1)))
+    write_text(path, json.dumps(key, indent=1))
 
 
 def _apart(detector: Detector, plain: Case, one: Unlisted, signals, actuator: ActuatorParameters) -> float:
@@ -160,7 +161,7 @@ def write_key_without(key: Path, path: Path) -> None:
     """Write the key of the case of T3 on the bench of one of T1, whose key it is but for what the library lacks."""
     written = json.loads(key.read_text())
     written["case"] = without_effect(case_from_dict(written["case"])).to_dict()
-    replace_atomically(path, lambda temporary: temporary.write_text(json.dumps(written, indent=1)))
+    write_text(path, json.dumps(written, indent=1))
 
 
 def near_rivals(effect: str) -> list[str]:

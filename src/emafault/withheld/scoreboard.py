@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..recording import replace_atomically
+from ..io.atomic import replace_atomically, write_text
 
 GREY, BLUE, RED = "#9aa3ad", "#2b6cb0", "#c0392b"
 STYLE = """
@@ -49,9 +49,9 @@ def write_scoreboard(scores: Mapping, folder: str | Path) -> Path:
         png = buffer.getvalue()
         pictures[name] = base64.b64encode(png).decode()
         replace_atomically(folder / f"{name}.png", lambda path, data=png: path.write_bytes(data))
-    replace_atomically(folder / "scores.json", lambda path: path.write_text(json.dumps(scores, indent=1)))
+    write_text(folder / "scores.json", json.dumps(scores, indent=1))
     page = folder / "scoreboard.html"
-    replace_atomically(page, lambda path: path.write_text(_page(scores, pictures)))
+    write_text(page, _page(scores, pictures))
     return page
 
 
@@ -194,7 +194,7 @@ def _measured(rows: Sequence[Mapping]) -> str:
         ("Put in by hand, so that the cause is known", False),
         ("The strongest effect left out: what counts as true is what the diagnosis itself named before", True),
     ):
-        mine = [r for r in rows if r["what"].startswith("left out") == left_out]
+        mine = [r for r in rows if (r["kind"] == "left out") == left_out]
         lines = "".join(
             f"<tr><td>{html.escape(r['twin'])} {html.escape(r['case'])}</td><td>{html.escape(r['what'])}</td>"
             f"<td>{r['verdict']}: {html.escape(', '.join(r['named']) or '-')}</td>"
@@ -202,7 +202,7 @@ def _measured(rows: Sequence[Mapping]) -> str:
             for r in mine
         )
         if mine:
-            right, literal = sum(bool(r["right"]) for r in mine), sum(bool(r["unknown"]) for r in mine)
+            right, literal = sum(bool(r["right"]) for r in mine), sum(r["verdict"] == "unknown" for r in mine)
             out += f"""<h3>{title}</h3><p>{right} of {len(mine)} right; {literal} with the word unknown itself. What the
 library lacks is right, too, where a remainder or the confirming recordings refuse it in the right
 equation.</p><table><tr><th>machine</th><th>change</th><th>verdict</th><th></th></tr>{lines}</table>"""

@@ -1,0 +1,181 @@
+"""The page of a diagnosis of the reference actuator, and what was found in sentences."""
+
+import html
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from ..faults import FAULT_NAMES
+from ..reporting.page import Page
+from ..reporting.retrained import MARKS
+from .diagnose import TELLING, TOLD
+from .terms import TERMS
+
+SHOWN = 4  # fault vectors in the picture
+OPEN = 0.05  # probability from which an effect that is not named is worth a line
+MOST = 8  # sets in the table
+TOLD_OF = 0.01  # probability from which a set behind the first has its parameters told
+
+
+def finding(verdict: Mapping[str, Any]) -> list[str]:
+    """What was found, a sentence each: the measuring chain first, then the machine, then the controller."""
+    out = [d["sentence"] for d in verdict["discovered"] if d["form"] != "remainder"]
+    kind, first = verdict["verdict"], verdict["which"][0]
+    if kind in ("explained", "partly") and first["effects"]:
+        sentences = [TERMS[e].SENTENCE for e in first["effects"] if e in TERMS]
+        text = "; ".join(sentences)
+        out.append(f"{text[0].upper()}{text[1:]} ({_fitted(first)}; probability {first['probability']:.3g}).")
+    if verdict["groups"]:
+        names = "; ".join(" or ".join(g).replace("_", " ") for g in verdict["groups"])
+        out.append(f"One of a group that these recordings cannot tell apart: {names}.")
+    if kind == "no_gap":
+        p = first["probability"]
+        out.append(
+            f"The nominal model within the unit's tolerances accounts for these recordings (probability {p:.3g})."
+        )
+    if kind == "unknown":
+        out.append(
+            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
+            f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
+        )
+    out += [d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"]
+    left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
+    for name, g in verdict["controller"].items():
+        if left and name != "position_gain":
+            continue  # what nothing describes may be a gain's doing, or take its place
+        apart = abs(g["value"] - g["nominal"])
+        sd = (g["high"] - g["low"]) / 3.29
+        if apart > TOLD * sd and apart > TELLING * g["nominal"]:
+            words = name.replace("_", " ")
+            out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
+    signal = verdict["shrinks"]["signal"]
+    if signal and signal["closed"] is not None:
+        out.append(f"On recordings not looked at before this closes {100 * signal['closed']:.0f} % of the gap.")
+    return out
+
+
+def _fitted(entry: Mapping[str, Any]) -> str:
+    parts = []
+    for name, p in entry["parameters"].items():
+        units = "" if p["units"] == "1" else f" {p['units']}"
+        parts.append(f"{name} = {p['value']:.4g}{units} ({p['low']:.4g} to {p['high']:.4g})")
+    return ", ".join(parts)
+
+
+def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) -> Page:
+    """The page of one diagnosis."""
+    from ..reporting import (
+        diagnosis as figures,  # what draws takes half a second to import, and the verdict does not wait
+    )
+
+    page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
+    for sentence in finding(verdict):
+        page.paragraph(sentence, "lead")
+    page.heading("What these recordings cannot tell")
+    page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
+    page.heading("Where: residual by equation and operating region")
+    rows = [
+        [
+            w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}",
+            f"{w['z']:.3g}", f"{w['share']:.1%}",
+        ]
+        for w in verdict["where"]
+    ]  # fmt: skip
+    page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
+    page.heading("Which: posterior probability")
+    page.figure("which", figures.draw_ranking(_ranked(verdict)), "Probabilities are exclusive and sum to one.")
+    rows = [
+        [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
+        for m, e in enumerate(verdict["which"][:MOST])
+        if e.get("parameters") and (m == 0 or e["probability"] >= TOLD_OF)
+    ]
+    if rows:
+        page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
+    if any(verdict["shrinks"].values()):
+        page.heading("How far the gap shrinks")
+        page.figure(
+            "how_far",
+            figures.draw_ladder(verdict["shrinks"]),
+            "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: tolerances fitted. "
+            "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
+        )
+    page.heading("Controller")
+    rows = [
+        [
+            n.replace("_", " "),
+            f"{g['nominal']:.4g}",
+            f"{g['value']:.4g}",
+            f"{g['low']:.4g} to {g['high']:.4g}",
+            g["units"],
+        ]
+        for n, g in verdict["controller"].items()
+    ]
+    page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
+    if verdict["fault_vector"]:
+        page.heading("Fault vector before and after")
+        page.figure(
+            "faults",
+            figures.draw_faults(_faults(verdict, truths)),
+            "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
+        )
+    page.parts.append(f"{MARKS[0]}{retrained}{MARKS[1]}")
+    page.heading("What to record next")
+    rows = [
+        [
+            e["command"], f"{e['ambient_temperature']:g} °C",
+            " from ".join(s.replace("_", " ").replace("+", " + ") for s in e["separates"]), f"{e['expected_odds']:.3g}",
+        ]
+        for e in verdict["next_experiment"]
+    ]  # fmt: skip
+    page.table(["command", "soak", "would tell", "expected odds"], rows)
+    page.heading("Sealed before the confirming recordings were opened")
+    page.parts.append(f"<pre>{html.escape(json.dumps(verdict['sealed'], indent=1))}</pre>")
+    return page
+
+
+def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Entries of the picture of probabilities."""
+    named = verdict["verdict"] in ("explained", "group", "partly")
+    out = []
+    for m, entry in enumerate(verdict["which"][:MOST]):
+        unknown = entry["effects"] == ["unknown"]
+        kind = "unknown" if unknown else "rival" if entry["effects"] else "empty"
+        if kind == "rival" and named and (m == 0 or entry.get("group")):
+            kind = "named"
+        label = " + ".join(e.replace("_", " ") for e in entry["effects"])
+        if unknown:
+            label = f"none of the library ({entry['equation'].replace('_', ' ')})"
+        out.append(
+            {
+                "label": label or "no gap", "probability": entry["probability"], "kind": kind,
+                "gain": entry.get("log_evidence_gain"),
+                "group": entry.get("group"),
+            }
+        )  # fmt: skip
+    return out
+
+
+def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
+    """What is left open: groups, and listed effects neither named nor ruled out."""
+    out = [f"{' or '.join(g).replace('_', ' ')}: one of them acts" for g in verdict["groups"]]
+    grouped = {e for g in verdict["groups"] for e in g}
+    named = set(verdict["which"][0]["effects"])
+    for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
+        if OPEN < p < 0.9 and effect not in grouped | named:
+            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+    return out or ["No listed effect is left between named and ruled out."]
+
+
+def _faults(verdict: Mapping[str, Any], truths: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the picture of the fault vector, recordings of one fault together."""
+    groups: dict[tuple, dict[str, Any]] = {}
+    for name, entry in verdict["fault_vector"].items():
+        key = tuple(round(entry["after"][c]["value"], 9) for c in FAULT_NAMES[:5])
+        truth = truths.get(name)
+        known = {c: float(truth[m]) for m, c in enumerate(FAULT_NAMES)} if truth is not None else {}
+        group = groups.setdefault(key, {**entry, "label": name, "truth": known, "more": -1})
+        group["more"] += 1
+    for group in groups.values():
+        if group["more"]:
+            group["label"] += f"\nand {group['more']} more"
+    return list(groups.values())[:SHOWN]

@@ -1,0 +1,213 @@
+"""The recording format: one netCDF-4 file holds one recording of the actuator, simulated or measured.
+
+Reading and writing live here together. Arrays in memory have the phase as their trailing axis, (time, phase); in
+the file it leads, (phase, time).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..faults import FAULT_NAMES
+from .atomic import replace_atomically
+
+PHASES = ("a", "b", "c")
+#: name -> (has a phase axis, unit, required, long name)
+VARIABLES: dict[str, tuple[bool, str, bool, str]] = {
+    "phase_voltage": (True, "V", True, "terminal to star point, mean over the interval"),
+    "phase_current": (True, "A", True, "mean over the interval, positive into the motor"),
+    "phase_current_end": (True, "A", False, "current at the interval's end"),
+    "rotor_speed": (False, "rad/s", True, "mechanical speed, mean over the interval"),
+    "rotor_angle": (False, "rad", True, "mechanical angle, unwrapped, at the interval's end"),
+    "output_position": (False, "rad", True, "user shaft, at the interval's end"),
+    "commanded_position": (False, "rad", True, "user shaft, at the interval's end"),
+    "bus_voltage": (False, "V", False, "mean over the interval"),
+}
+MINIMUM_DURATION = 0.2  # s
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording; voltages (V), currents (A), speed (rad/s), angles (rad), ambient temperature (degC)."""
+
+    time: np.ndarray  # (time,) s, end of each interval
+    phase_voltage: np.ndarray  # (time, phase)
+    phase_current: np.ndarray  # (time, phase)
+    rotor_speed: np.ndarray  # (time,)
+    rotor_angle: np.ndarray  # (time,)
+    output_position: np.ndarray  # (time,)
+    commanded_position: np.ndarray  # (time,)
+    ambient_temperature: float
+    phase_current_end: np.ndarray | None = None  # (time, phase)
+    bus_voltage: np.ndarray | None = None  # (time,)
+    fault: np.ndarray | None = None  # (6,)
+    attributes: dict[str, str] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def interval(self) -> float:
+        """Recording interval (s)."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    @property
+    def health(self) -> str:
+        """``healthy``, ``unknown`` or ``seeded``; a file that does not say is ``unknown``."""
+        return self.attributes.get("health", "unknown")
+
+
+def write_recording(path: str | Path, recording: Recording) -> None:
+    """Write one recording in the format.
+
+    Raises
+    ------
+    InputError : the file cannot be written
+    """
+    import netCDF4
+
+    def write(temporary: Path) -> None:
+        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as file:
+            file.createDimension("time", len(recording.time))
+            file.createDimension("phase", 3)
+            phase = file.createVariable("phase", str, ("phase",))
+            for j, letter in enumerate(PHASES):
+                phase[j] = letter
+            time = file.createVariable("time", "f8", ("time",), zlib=True, complevel=1)
+            time.units, time.long_name = "s", "end of each recording interval"
+            time[:] = recording.time
+            for name, (phased, unit, _, long_name) in VARIABLES.items():
+                values = getattr(recording, name)
+                if values is None:
+                    continue
+                dims = ("phase", "time") if phased else ("time",)
+                variable = file.createVariable(name, "f8", dims, zlib=True, complevel=1)
+                variable.units, variable.long_name = unit, long_name
+                variable[:] = values.T if phased else values
+            ambient = file.createVariable("ambient_temperature", "f8", ())
+            ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
+            ambient[...] = recording.ambient_temperature
+            if recording.fault is not None:
+                file.createDimension("component", 6)
+                component = file.createVariable("component", str, ("component",))
+                for j, label in enumerate(FAULT_NAMES):
+                    component[j] = label
+                fault = file.createVariable("fault", "f8", ("component",))
+                fault.long_name = "fault vector; Na, Nb, Nc, xi_x, xi_y (1), dT (K)"
+                fault[:] = recording.fault
+            attributes = {"title": "electromechanical actuator recording", "command": "unknown"}
+            attributes |= {"health": "unknown", "unit": "unknown", "Conventions": "CF-1.11"}
+            for key, value in (attributes | recording.attributes).items():
+                file.setncattr(key, value)
+
+    replace_atomically(Path(path), write)
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read and check one recording.
+
+    Raises
+    ------
+    InputError : naming the file, the variable and the rule broken
+    """
+    import netCDF4
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        file = netCDF4.Dataset(path)
+    except OSError as error:
+        raise InputError(f"{path}: not a readable netCDF-4 file ({error.strerror or error})") from error
+    with file:
+        file.set_auto_mask(True)
+        try:
+            return _read_open(path, file)
+        except (RuntimeError, OSError) as error:
+            raise InputError(f"{path}: the file is truncated or damaged ({error})") from error
+
+
+def _read_open(path: Path, file) -> Recording:
+    def values(name: str, dims: tuple[str, ...], unit: str | None) -> np.ndarray:
+        variable = file.variables[name]
+        if variable.dimensions != dims:
+            raise InputError(f"{path}: {name} has dimensions {variable.dimensions}, the format asks for {dims}")
+        got = getattr(variable, "units", None)
+        if unit is not None and got != unit:
+            raise InputError(f"{path}: {name} has unit '{got}', the format asks for '{unit}'")
+        if not np.issubdtype(variable.dtype, np.number):
+            raise InputError(f"{path}: {name} is not numeric")
+        data: np.ndarray = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
+        if not np.all(np.isfinite(data)):
+            raise InputError(f"{path}: {name} holds NaN, infinite or missing values; none are accepted")
+        return data
+
+    required = ["time", *(n for n, spec in VARIABLES.items() if spec[2]), "ambient_temperature"]
+    for name in required:
+        if name not in file.variables:
+            raise InputError(f"{path}: the required variable {name} is missing")
+    if "run" in file.dimensions:
+        raise InputError(f"{path}: has a run dimension; a dataset is not a recording, one run per file is accepted")
+    if "phase" not in file.dimensions or len(file.dimensions["phase"]) != 3:
+        raise InputError(f"{path}: the dimension phase must have the three entries a, b, c")
+    time = values("time", ("time",), "s")
+    if len(time) < 2:
+        raise InputError(f"{path}: time has {len(time)} samples; at least {MINIMUM_DURATION} s of data are needed")
+    steps = np.diff(time)
+    if np.any(steps <= 0):
+        raise InputError(f"{path}: time does not increase everywhere")
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if np.max(np.abs(steps - step)) > 1e-3 * step:
+        raise InputError(f"{path}: time is not uniform; the format asks for one constant interval")
+    if step * len(time) < MINIMUM_DURATION * (1 - 1e-9):
+        raise InputError(f"{path}: holds {step * len(time):.3g} s of data; at least {MINIMUM_DURATION} s are needed")
+    data: dict[str, np.ndarray | None] = {}
+    for name, (phased, unit, _, _) in VARIABLES.items():
+        if name not in file.variables:
+            data[name] = None
+            continue
+        array = values(name, ("phase", "time") if phased else ("time",), unit)
+        data[name] = np.ascontiguousarray(array.T)
+    speed = data["rotor_speed"]
+    assert speed is not None
+    if not np.any(speed != 0.0):
+        raise InputError(f"{path}: rotor_speed never leaves zero; a recording in motion is needed")
+    ambient = float(values("ambient_temperature", (), "degC"))
+    fault = values("fault", ("component",), None) if "fault" in file.variables else None
+    if fault is not None and fault.shape != (6,):
+        raise InputError(f"{path}: fault has {fault.size} components, the format asks for 6")
+    attributes = {key: str(file.getncattr(key)) for key in file.ncattrs()}
+    health = attributes.get("health", "unknown")
+    if health not in ("healthy", "unknown", "seeded"):
+        raise InputError(f"{path}: health is '{health}', accepted are healthy, unknown and seeded")
+    return Recording(
+        time=time,
+        ambient_temperature=ambient,
+        fault=fault,
+        attributes=attributes,
+        name=path.name,
+        **data,  # type: ignore[arg-type]
+    )
+
+
+def recordings_in(paths: Mapping[str, Path] | list[str | Path]) -> list[Path]:
+    """Files named by a list of files and folders; a folder stands for its ``*.nc`` files in order of name.
+
+    Raises
+    ------
+    InputError : a path that does not exist or a folder without recordings
+    """
+    found: list[Path] = []
+    for entry in paths:
+        path = Path(entry)
+        if path.is_dir():
+            inside = sorted(p for p in path.glob("*.nc") if not p.name.startswith("."))
+            if not inside:
+                raise InputError(f"{path}: the folder holds no recording (*.nc)")
+            found += inside
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise InputError(f"{path}: no such file or folder")
+    return found

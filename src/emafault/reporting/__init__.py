@@ -1,0 +1,1 @@
+"""Pages, plots and the files that a diagnosis writes, apart from what computes them."""

@@ -1,0 +1,140 @@
+"""Figures of a diagnosis, drawn from plain arrays."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from . import style
+
+BEFORE, AFTER, MEASURED, FLOOR = "#c8553d", "#2a9d8f", "#22262b", "#8a8a8a"
+
+
+def draw_ranking(entries: Sequence[Mapping[str, Any]]) -> plt.Figure:
+    """Probability and log evidence gain of every reading; members of a group share a bracket.
+
+    ``entries``: label, probability, gain (None where it has none), group, kind (named, rival, empty, unknown).
+    """
+    fig, (left, right) = plt.subplots(
+        1, 2, figsize=(9.6, 0.36 * len(entries) + 1.2), sharey=True, width_ratios=[1, 1.1]
+    )
+    colours = {"named": AFTER, "rival": "#9db4c0", "empty": "#6c757d", "unknown": BEFORE}
+    y = np.arange(len(entries))
+    for m, entry in enumerate(entries):
+        colour = colours[entry["kind"]]
+        left.barh(m, entry["probability"], color=colour, height=0.66)
+        text = f"{100 * entry['probability']:.1f} %" if entry["probability"] >= 5e-4 else "< 0.1 %"
+        left.text(entry["probability"] + 0.01, m, text, va="center", fontsize=8.5)
+        if entry["gain"] is None:
+            right.text(
+                0.0,
+                m,
+                "  not a fit" if entry["kind"] == "unknown" else "  reference",
+                va="center",
+                fontsize=8.5,
+                color="#777",
+            )
+        else:
+            right.barh(m, entry["gain"], color=colour, height=0.66)
+            side = "left" if entry["gain"] >= 0 else "right"
+            digits = 0 if abs(entry["gain"]) > 1e3 else 1
+            right.annotate(
+                f"{entry['gain']:,.{digits}f}", (entry["gain"], m), xytext=(4 if side == "left" else -4, 0),
+                textcoords="offset points", va="center", ha=side, fontsize=8.5,
+            )  # fmt: skip
+    grouped = [m for m, entry in enumerate(entries) if entry["group"]]
+    if len(grouped) > 1:
+        left.plot(
+            [1.13, 1.16, 1.16, 1.13],
+            [grouped[0] - 0.3, grouped[0] - 0.3, grouped[-1] + 0.3, grouped[-1] + 0.3],
+            color="#444",
+            lw=1,
+            clip_on=False,
+        )
+        left.text(1.18, np.mean(grouped), "one\ngroup", va="center", fontsize=8, clip_on=False)
+    left.set_yticks(y, [entry["label"] for entry in entries])
+    left.set_xlim(0, 1.12)
+    left.set_xticks([0, 0.25, 0.5, 0.75, 1.0], ["0", "25 %", "50 %", "75 %", "100 %"])
+    left.set_xlabel("probability")
+    gains = [abs(e["gain"]) for e in entries if e["gain"] is not None]
+    if gains and max(gains) > 200:
+        right.set_xscale("symlog", linthresh=10)
+    right.margins(x=0.16)
+    right.set_xlabel("gain in log evidence over no effect")
+    left.invert_yaxis()
+    for ax in (left, right):
+        ax.grid(axis="y", visible=False)
+        ax.tick_params(axis="y", length=0)
+    return fig
+
+
+def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.Figure:
+    """How far: root mean square misfit of each model on the held-out recordings, for signal, features, fault vector."""
+    shown = {k: v for k, v in rungs.items() if v}
+    fig, axes = plt.subplots(1, 3, figsize=(11, 2.9), squeeze=False)
+    for ax in axes[0, len(shown) :]:
+        ax.set_axis_off()
+    names = ("nominal", "recalibrated", "placebo", "after", "floor")
+    colours = dict(zip(names, ("#b9b9b5", BEFORE, "#dcae7c", AFTER, FLOOR)))
+    units = {
+        "signal": "misfit over noise (rms)",
+        "features": "R, k error over noise (rms)",
+        "fault_vector": "fault error (rms, % of range)",
+    }
+    for ax, (kind, rung) in zip(axes[0], shown.items()):
+        present = [n for n in names if rung.get(n) is not None]
+        values = [float(rung[n]) for n in present]  # type: ignore[arg-type]
+        ax.bar(range(len(present)), values, color=[colours[n] for n in present], width=0.66)
+        if max(values) > 12 * max(min(values), 1e-9):
+            ax.set_yscale("log")
+            ax.set_ylim(0.5 * min(values), 2.6 * max(values))
+        else:
+            ax.set_ylim(0, 1.18 * max(values))
+        for m, value in enumerate(values):
+            ax.annotate(
+                f"{value:.3g}", (m, value), xytext=(0, 2), textcoords="offset points", ha="center", fontsize=8.5
+            )
+        ax.set_xticks(range(len(present)), present, rotation=28, ha="right")
+        share = rung.get("closed")
+        title = kind.replace("_", " ")
+        ax.set_title(title + (f": {100 * share:.1f} % closed" if share is not None else ""), loc="left")
+        ax.set_ylabel(units[kind])
+        ax.grid(axis="x", visible=False)
+    return fig
+
+
+def draw_faults(groups: Sequence[Mapping[str, Any]]) -> plt.Figure:
+    """Fault vector before and after with 90 % intervals, one row of panels per different fault; a tick marks the truth.
+
+    ``groups``: label, before, after (component -> value, low, high), truth (component -> value or absent).
+    """
+    fig, axes = plt.subplots(
+        len(groups), 3, figsize=(9.6, 1.55 * len(groups) + 0.5), squeeze=False, width_ratios=[3, 2, 1.3]
+    )
+    parts = (("Na", "Nb", "Nc"), ("xi_x", "xi_y"), ("dT",))
+    for row, group in zip(axes, groups):
+        for ax, components in zip(row, parts):
+            for m, c in enumerate(components):
+                for shift, kind, colour in ((-0.13, "before", BEFORE), (0.13, "after", AFTER)):
+                    entry = group[kind].get(c)
+                    if entry is None:
+                        continue
+                    low, high = entry["value"] - entry["low"], entry["high"] - entry["value"]
+                    ax.errorbar(
+                        m + shift, entry["value"], yerr=[[max(low, 0)], [max(high, 0)]], fmt="o", ms=4.5, lw=1.6,
+                        color=colour, capsize=2.5, label=kind if m == 0 and components[0] == "Na" else None,
+                    )  # fmt: skip
+                if group["truth"] and c in group["truth"]:
+                    ax.plot(
+                        [m - 0.32, m + 0.32], [group["truth"][c]] * 2, color=MEASURED, lw=1.3, zorder=1,
+                        label="truth" if m == 0 and components[0] == "Na" else None,
+                    )  # fmt: skip
+            ax.set_xticks(range(len(components)), [style.LABELS[c] for c in components])
+            ax.set_xlim(-0.6, len(components) - 0.4)
+            ax.grid(axis="x", visible=False)
+            if components[0] != "dT":
+                ax.axhline(0, color="#bbb", lw=0.8, zorder=0)
+        row[0].set_ylabel(group["label"], fontsize=8.5)
+    axes[0, 0].legend(ncols=3, fontsize=8, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.1)
+    return fig

@@ -1,0 +1,87 @@
+"""What every diagnosis writes: names of files, the folder of results, plain JSON, an MLflow run."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..progress import say
+
+VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
+#: the format of every verdict, the reference actuator's and a measured machine's
+SCHEMA_FILE = Path(__file__).with_name("verdict.schema.json")
+
+
+def results_folder() -> Path:
+    """``results`` here, else the project's."""
+    here = Path("results")
+    return here if here.is_dir() else Path(__file__).resolve().parents[3] / "results"
+
+
+def to_json(value: Any) -> str:
+    """Plain JSON; numbers that JSON has not (NaN, infinity) become null."""
+    return json.dumps(_plain(value), indent=1, allow_nan=False) + "\n"
+
+
+def checked(verdict: Mapping[str, Any]) -> str:
+    """A verdict as written, checked against the schema of its format."""
+    import jsonschema
+
+    text = to_json(verdict)
+    jsonschema.validate(json.loads(text), json.loads(SCHEMA_FILE.read_text()))
+    return text
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(v) for v in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def file_name(text: str) -> str:
+    """Text as the name of a file and of an experiment."""
+    kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
+    return kept.lstrip("_-") or "bench"
+
+
+def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
+    """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
+    from ..tracking import Entry, log_run
+
+    first = verdict["which"][0]
+    metrics = {"probability": first["probability"]}
+    for kind, rung in verdict["shrinks"].items():
+        metrics |= {f"{kind}.{k}": v for k, v in (rung or {}).items() if v is not None}
+    for name, p in first.get("parameters", {}).items():
+        metrics[f"parameter.{name}"] = p["value"]
+    entry = Entry(
+        verdict["bench"],
+        parameters={
+            "verdict": verdict["verdict"],
+            "effects": "+".join(first["effects"]) or "no_gap",
+            "twin": verdict["twin"],
+            "recordings": verdict["recordings"],
+            "digest": verdict["digest"],
+        },
+        metrics=metrics,
+        tags={"stage": "diagnosis", "bench": verdict["bench"]},
+        files={str(folder / name): "" for name in (VERDICT, REPORT)},
+    )
+    try:
+        uri = tracking["uri"]
+        if uri.startswith("sqlite:///results/"):
+            uri = f"sqlite:///{results_folder() / uri.removeprefix('sqlite:///results/')}"
+        log_run(uri, tracking["experiment"], entry)
+    except Exception as error:
+        say(f"not tracked: {' '.join(str(error).split())[:200]}")

@@ -1,0 +1,213 @@
+"""Benches that must be refused, set aside or limited, each in one line; and how a bench is split."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emafault.actuator.commands import jumps_of
+from emafault.errors import InputError
+from emafault.io.bench import check_bench, read_bench, refuse_mistaken, split_bench
+from emafault.io.recording import write_recording
+
+SWAPPED = [1, 0, 2]
+CYCLED = [1, 2, 0]
+NAME = "recording_2.nc"
+
+
+def _phases(recording, order, *variables):
+    return replace(recording, **{v: getattr(recording, v)[:, order] for v in variables})
+
+
+def _clip(recording, variable, share):
+    values = getattr(recording, variable)
+    level = share * np.max(np.abs(values))
+    return replace(recording, **{variable: np.clip(values, -level, level)})
+
+
+def _every(recording, step):
+    names = ("time", "phase_voltage", "phase_current", "rotor_speed", "rotor_angle", "output_position")
+    picked = {n: getattr(recording, n)[step - 1 :: step] for n in (*names, "commanded_position")}
+    return replace(recording, **picked, phase_current_end=None, bus_voltage=None)
+
+
+def _frozen(recording):
+    angle = recording.rotor_angle.copy()
+    fastest = int(np.argmax(np.abs(recording.rotor_speed)))
+    angle[fastest - 50 : fastest + 50] = angle[fastest - 50]
+    return replace(recording, rotor_angle=angle)
+
+
+def _still(recording):
+    values = {n: np.zeros_like(getattr(recording, n)) for n in ("commanded_position", "output_position")}
+    rng = np.random.default_rng(0)
+    count = len(recording.time)
+    values |= {"rotor_angle": 1e-4 * rng.standard_normal(count), "rotor_speed": 0.3 * rng.standard_normal(count)}
+    return replace(recording, **values)
+
+
+CURRENTS = ("phase_current", "phase_current_end")
+MISTAKEN = {
+    "currents swapped": (lambda r: _phases(r, SWAPPED, *CURRENTS), "phase_current"),
+    "mean currents swapped": (lambda r: _phases(r, SWAPPED, "phase_current"), "phase_current"),
+    "voltages swapped": (lambda r: _phases(r, SWAPPED, "phase_voltage"), "phase_voltage"),
+    "phases cycled": (lambda r: _phases(r, CYCLED, *CURRENTS, "phase_voltage"), "rotor_angle"),
+    "currents negative": (lambda r: replace(r, **{n: -getattr(r, n) for n in CURRENTS}), "phase_current"),
+    "speed negative": (lambda r: replace(r, rotor_speed=-r.rotor_speed), "rotor_speed"),
+    "speed in rpm": (lambda r: replace(r, rotor_speed=r.rotor_speed * 30 / np.pi), "rotor_speed"),
+    "degrees": (lambda r: replace(r, output_position=np.rad2deg(r.output_position)), "output_position"),
+    "command for position": (
+        lambda r: replace(r, output_position=r.commanded_position, commanded_position=r.output_position),
+        "output_position",
+    ),
+    "kelvin": (lambda r: replace(r, ambient_temperature=r.ambient_temperature + 273.15), "ambient_temperature"),
+}
+USELESS = {
+    "still": (_still, "commanded_position"),
+    "current clips": (lambda r: _clip(r, "phase_current", 0.6), "phase_current"),
+    "voltage clips": (lambda r: _clip(r, "phase_voltage", 0.6), "phase_voltage"),
+    "speed clips": (lambda r: _clip(r, "rotor_speed", 0.6), "rotor_speed"),
+    "angle frozen": (_frozen, "rotor_angle"),
+    "slow": (lambda r: _every(r, 10), "time"),
+    "cut": (lambda r: replace(r, output_position=r.output_position + 0.1), "output_position"),
+}
+
+
+@pytest.mark.parametrize("kind", MISTAKEN)
+def test_mistaken_sensors_refuse_the_bench(plain, shop, kind):
+    change, variable = MISTAKEN[kind]
+    with pytest.raises(InputError) as refusal:
+        check_bench("bench", plain | {NAME: change(plain[NAME])}, shop.actuator)
+    text = str(refusal.value)
+    assert text.startswith(f"{NAME}: {variable}") and "\n" not in text
+
+
+@pytest.mark.parametrize("kind", USELESS)
+def test_useless_recordings_are_set_aside_with_a_warning_or_refused_where_nothing_is_left(plain, shop, kind):
+    change, variable = USELESS[kind]
+    bench = check_bench("bench", plain | {NAME: change(plain[NAME])}, shop.actuator)
+    assert NAME not in bench.recordings and len(bench.recordings) == 3
+    (warning,) = [w for w in bench.warnings if w["kind"] == "set aside"]
+    assert warning["file"] == NAME and warning["variable"] == variable
+    with pytest.raises(InputError, match=NAME):
+        check_bench("bench", {NAME: change(plain[NAME])}, shop.actuator)
+
+
+def test_a_good_bench_passes_whole_with_strong_effects_too(plain, shop):
+    assert not [w for w in check_bench("bench", plain, shop.actuator).warnings if w["kind"] == "set aside"]
+    strong = {
+        "angle_offset": {"offset": 5.0},
+        "current_gain": {"g_a": 1.02, "g_b": 0.98, "g_c": 1.0},
+        "speed_quantisation": {"step": 5.0},
+        "virtual_neutral": {"on": 1.0},
+        "load_constant": {"T": 10.0},
+    }
+    for effect, values in strong.items():
+        found = check_bench("bench", shop.make_bench({effect: values}), shop.actuator)
+        assert len(found.recordings) == 4, effect
+    # without noise values repeat exactly, which must not count as clipping
+    assert len(check_bench("bench", shop.make_bench(clean=True), shop.actuator).recordings) == 4
+
+
+def test_a_coarsely_truncated_speed_is_no_mistaken_sensor_but_a_wrong_sign_or_unit_is(plain, shop):
+    recording = plain[NAME]
+    time = recording.interval * np.arange(1, len(recording.time) + 1)
+    angle = 0.6 * (1.0 - np.cos(2.0 * np.pi * 1.7 * time))
+    speed = np.gradient(angle, recording.interval)
+    slow = replace(recording, rotor_angle=angle, output_position=angle / shop.actuator.gear_ratio)
+    refuse_mistaken(NAME, replace(slow, rotor_speed=3.7 * np.floor(speed / 3.7)), shop.actuator)
+    for wrong in (-speed, speed * 30.0 / np.pi):
+        with pytest.raises(InputError, match="rotor_speed"):
+            refuse_mistaken(NAME, replace(slow, rotor_speed=wrong), shop.actuator)
+
+
+def test_two_units_copies_and_broken_files(plain, shop, tmp_path):
+    other = replace(plain[NAME], attributes=plain[NAME].attributes | {"unit": "unit 8"})
+    with pytest.raises(InputError, match=r"recording_2\.nc: unit is 'unit 8'"):
+        check_bench("bench", plain | {NAME: other}, shop.actuator)
+    copied = check_bench("bench", plain | {"zz.nc": plain[NAME]}, shop.actuator)
+    assert "zz.nc" not in copied.recordings and "same data as recording_2.nc" in copied.warnings[0]["message"]
+    for name, recording in plain.items():
+        write_recording(tmp_path / name, recording)
+    assert list(read_bench(tmp_path, shop.actuator).recordings) == sorted(plain)
+    (tmp_path / NAME).write_bytes((tmp_path / NAME).read_bytes()[:5000])
+    with pytest.raises(InputError, match=NAME):
+        read_bench(tmp_path, shop.actuator)
+
+
+def test_what_recordings_cannot_tell_is_said(plain, shop):
+    one = check_bench("bench", {NAME: plain[NAME]}, shop.actuator).warnings
+    said = " ".join(w["message"] for w in one)
+    assert "single recording" in said and "temperature" in said and "no recording is called healthy" in said
+    forward = check_bench("bench", {"recording_0.nc": plain["recording_0.nc"]}, shop.actuator).warnings
+    assert any("one direction" in w["message"] for w in forward)
+    bare = {n: replace(r, phase_current_end=None, bus_voltage=None) for n, r in plain.items()}
+    messages = [w["variable"] for w in check_bench("bench", bare, shop.actuator).warnings]
+    assert "phase_current_end" in messages and "bus_voltage" in messages
+
+
+def _plan(shop, count, healths):
+    kinds = (
+        ("parabolic", {"acceleration": 0.4}),
+        ("ramp", {"speed": 0.2}),
+        ("sine", {"amplitude": 0.03, "frequency": 2.0}),
+        ("parabolic", {"acceleration": -0.5}),
+    )
+    plans = [(*kinds[n % 4], -30.0 + 15.0 * n, healths[n % len(healths)]) for n in range(count)]
+    return shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+
+
+@pytest.mark.parametrize(("count", "held"), [(1, 0), (2, 1), (3, 1), (4, 1), (6, 2), (8, 2)])
+def test_how_many_are_held_out(shop, count, held):
+    bench = _plan(shop, count, ["unknown"])
+    explore, confirm = split_bench(bench)
+    assert len(confirm) == held and sorted(explore + confirm) == sorted(bench)
+    shuffled = dict(sorted(bench.items(), reverse=True))
+    assert split_bench(shuffled) == (explore, confirm)
+
+
+def test_explore_keeps_a_healthy_recording_and_every_fault_that_confirm_has(shop):
+    bench = _plan(shop, 8, ["healthy", "unknown", "unknown", "healthy"])
+    explore, _ = split_bench(bench)
+    health = {n: r.health for n, r in bench.items()}
+    assert {"healthy", "unknown"} <= {health[n] for n in explore}
+    ambient = {n: r.ambient_temperature for n, r in bench.items()}
+    assert max(ambient[n] for n in explore) == max(ambient.values())  # extremes explore, so that confirm interpolates
+    one_of_each = dict(zip(("a", "b"), _plan(shop, 2, ["healthy", "unknown"]).values()))
+    assert split_bench(one_of_each) == (["a", "b"], [])
+
+
+def test_repetitions_of_a_condition_stay_on_one_side(shop):
+    bench = _plan(shop, 4, ["unknown"])
+    repeated = {f"{n}{k}": r for n, r in bench.items() for k in "xy"}
+    explore, confirm = split_bench(repeated)
+    assert confirm and {n[:-1] for n in explore}.isdisjoint({n[:-1] for n in confirm})
+
+
+def test_steps_alone_neither_explore_nor_confirm(shop):
+    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    plans = [(*kind, 20.0 * n, "unknown") for n, kind in enumerate((moving, moving, step, step))]
+    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+    steps = {n for n, r in bench.items() if len(jumps_of(r.commanded_position))}
+    assert len(steps) == 2
+    for side in split_bench(bench):
+        assert not set(side) <= steps
+
+
+def test_a_temperature_is_not_left_to_a_step_alone(shop):
+    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    plans = [(*kind, t, "unknown") for kind, t in ((moving, 45.0), (moving, 60.0), (step, 0.0), (moving, 20.0))]
+    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+    explore, _ = split_bench(bench)
+    smooth = [r for n, r in bench.items() if n in explore and not len(jumps_of(r.commanded_position))]
+    assert np.ptp([r.ambient_temperature for r in smooth]) > 38.0
+
+
+def test_the_one_recording_of_large_currents_explores(shop):
+    quiet, hard = ("sine", {"amplitude": 0.004, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
+    for place in range(4):
+        plans = [(*(hard if n == place else quiet), 20.0 * n, "unknown") for n in range(4)]
+        bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
+        largest = max(bench, key=lambda n: np.abs(bench[n].phase_current).max())
+        assert largest == sorted(bench)[place]
+        assert largest in split_bench(bench)[0]
