@@ -1,14 +1,14 @@
-"""Benches that must be refused, set aside or limited, each in one line; and how a bench is split."""
+"""Benches that must be refused, set aside or limited, each in one line."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from emafault.actuator.commands import jumps_of
 from emafault.errors import InputError
-from emafault.io.bench import check_bench, read_bench, refuse_mistaken, split_bench
+from emafault.io.bench import check_bench, read_bench
 from emafault.io.recording import write_recording
+from emafault.io.sensors import refuse_mistaken
 
 SWAPPED = [1, 0, 2]
 CYCLED = [1, 2, 0]
@@ -144,70 +144,3 @@ def test_what_recordings_cannot_tell_is_said(plain, shop):
     bare = {n: replace(r, phase_current_end=None, bus_voltage=None) for n, r in plain.items()}
     messages = [w["variable"] for w in check_bench("bench", bare, shop.actuator).warnings]
     assert "phase_current_end" in messages and "bus_voltage" in messages
-
-
-def _plan(shop, count, healths):
-    kinds = (
-        ("parabolic", {"acceleration": 0.4}),
-        ("ramp", {"speed": 0.2}),
-        ("sine", {"amplitude": 0.03, "frequency": 2.0}),
-        ("parabolic", {"acceleration": -0.5}),
-    )
-    plans = [(*kinds[n % 4], -30.0 + 15.0 * n, healths[n % len(healths)]) for n in range(count)]
-    return shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
-
-
-@pytest.mark.parametrize(("count", "held"), [(1, 0), (2, 1), (3, 1), (4, 1), (6, 2), (8, 2)])
-def test_how_many_are_held_out(shop, count, held):
-    bench = _plan(shop, count, ["unknown"])
-    explore, confirm = split_bench(bench)
-    assert len(confirm) == held and sorted(explore + confirm) == sorted(bench)
-    shuffled = dict(sorted(bench.items(), reverse=True))
-    assert split_bench(shuffled) == (explore, confirm)
-
-
-def test_explore_keeps_a_healthy_recording_and_every_fault_that_confirm_has(shop):
-    bench = _plan(shop, 8, ["healthy", "unknown", "unknown", "healthy"])
-    explore, _ = split_bench(bench)
-    health = {n: r.health for n, r in bench.items()}
-    assert {"healthy", "unknown"} <= {health[n] for n in explore}
-    ambient = {n: r.ambient_temperature for n, r in bench.items()}
-    assert max(ambient[n] for n in explore) == max(ambient.values())  # extremes explore, so that confirm interpolates
-    one_of_each = dict(zip(("a", "b"), _plan(shop, 2, ["healthy", "unknown"]).values()))
-    assert split_bench(one_of_each) == (["a", "b"], [])
-
-
-def test_repetitions_of_a_condition_stay_on_one_side(shop):
-    bench = _plan(shop, 4, ["unknown"])
-    repeated = {f"{n}{k}": r for n, r in bench.items() for k in "xy"}
-    explore, confirm = split_bench(repeated)
-    assert confirm and {n[:-1] for n in explore}.isdisjoint({n[:-1] for n in confirm})
-
-
-def test_steps_alone_neither_explore_nor_confirm(shop):
-    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
-    plans = [(*kind, 20.0 * n, "unknown") for n, kind in enumerate((moving, moving, step, step))]
-    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
-    steps = {n for n, r in bench.items() if len(jumps_of(r.commanded_position))}
-    assert len(steps) == 2
-    for side in split_bench(bench):
-        assert not set(side) <= steps
-
-
-def test_a_temperature_is_not_left_to_a_step_alone(shop):
-    moving, step = ("sine", {"amplitude": 0.03, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
-    plans = [(*kind, t, "unknown") for kind, t in ((moving, 45.0), (moving, 60.0), (step, 0.0), (moving, 20.0))]
-    bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
-    explore, _ = split_bench(bench)
-    smooth = [r for n, r in bench.items() if n in explore and not len(jumps_of(r.commanded_position))]
-    assert np.ptp([r.ambient_temperature for r in smooth]) > 38.0
-
-
-def test_the_one_recording_of_large_currents_explores(shop):
-    quiet, hard = ("sine", {"amplitude": 0.004, "frequency": 2.0}), ("step", {"amplitude": 0.02, "time": 0.03})
-    for place in range(4):
-        plans = [(*(hard if n == place else quiet), 20.0 * n, "unknown") for n in range(4)]
-        bench = shop.make_bench(plans=plans, duration=0.2, interval=1e-3)
-        largest = max(bench, key=lambda n: np.abs(bench[n].phase_current).max())
-        assert largest == sorted(bench)[place]
-        assert largest in split_bench(bench)[0]

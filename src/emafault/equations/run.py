@@ -7,7 +7,8 @@ from typing import Any
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
-from ..io.bench import read_bench, split_bench
+from ..io.bench import read_bench
+from ..io.split import split_bench
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder
 from .diagnose import diagnose

@@ -17,7 +17,8 @@ from ..effects import EFFECTS
 from ..equations.diagnose import diagnose
 from ..errors import InputError
 from ..io.atomic import write_text
-from ..io.bench import read_bench, split_bench
+from ..io.bench import read_bench
+from ..io.split import split_bench
 from ..reporting.written import to_json
 from ..withheld.benches import make_cases, write_key_without
 from ..withheld.cases import Case, draw_case, with_twin, without_effect

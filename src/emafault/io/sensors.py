@@ -1,0 +1,224 @@
+"""Signals that contradict each other or their sensors: what refuses a recording, and what makes one useless."""
+
+from collections.abc import Callable
+from itertools import permutations
+
+import numpy as np
+
+from ..actuator.motor import AXIS
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from .recording import PHASES, Recording
+
+SLOWEST_INTERVAL = 1e-3  # s
+LEAST_TRAVEL = 0.1  # rad of the rotor; less is standing still
+AT_REST = 5.0  # rad/s above what full current reaches from rest
+START_POSITION = 3e-3  # rad at the user shaft, from zero
+MOVING = 2.0  # rad/s
+CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme value
+CLIPPED_LEAST = 20
+CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
+LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
+DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
+BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
+TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
+
+
+# --- sensors that are not what the file says -------------------------------------------------------------------------
+
+
+def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameters) -> None:
+    """Refuse signals that contradict each other by more than any effect could.
+
+    Raises
+    ------
+    InputError : naming the file, the variable and what contradicts it
+    """
+    ambient = recording.ambient_temperature
+    if not TEMPERATURES[0] <= ambient <= TEMPERATURES[1]:
+        low, high = TEMPERATURES
+        raise InputError(f"{path}: ambient_temperature is {ambient:g} degC, accepted is {low:g} to {high:g} degC")
+    theta = recording.rotor_angle - recording.rotor_angle[0]
+    travel = float(np.ptp(theta))
+    if travel > 1.0:
+        by_speed = np.cumsum(recording.rotor_speed) * recording.interval
+        if not _follows(theta, by_speed)[0] and not _alike_but_for_drift(theta, by_speed, recording.interval):
+            _refuse_unlike(path, "rotor_speed", "the rate of rotor_angle", theta, by_speed)
+    if travel > 5.0:
+        by_shaft = actuator.gear_ratio * (recording.output_position - recording.output_position[0])
+        _refuse_unlike(
+            path, "output_position", f"rotor_angle over the gear ratio {actuator.gear_ratio:g}", theta, by_shaft
+        )
+        by_rotor = theta / actuator.gear_ratio
+        of_shaft, of_command = (
+            np.std(values - by_rotor) for values in (recording.output_position, recording.commanded_position)
+        )
+        if of_command < 0.2 * of_shaft and of_shaft > 5e-4:
+            raise InputError(
+                f"{path}: output_position and commanded_position are swapped: the command goes with the rotor"
+            )
+    if recording.phase_current_end is not None:
+        order = _best_order(_correlation(recording.phase_current, recording.phase_current_end))
+        if order is not None and order != (0, 1, 2):
+            raise InputError(f"{path}: phase_current_end has its phases in another order than phase_current")
+    if travel * actuator.pole_pairs > 4 * np.pi:
+        _refuse_swapped_phases(path, recording, actuator)
+
+
+def _follows(wanted: np.ndarray, got: np.ndarray) -> tuple[bool, float, float]:
+    """Whether ``got`` goes with ``wanted``: slope near one and alike; both figures."""
+    slope = float(wanted @ got / max(wanted @ wanted, 1e-30))
+    likeness = float(np.corrcoef(wanted, got)[0, 1]) if np.ptp(got) > 0 else 0.0
+    return likeness >= 0.8 and 0.4 < slope < 2.5, slope, likeness
+
+
+def _alike_but_for_drift(wanted: np.ndarray, got: np.ndarray, interval: float) -> bool:
+    """Whether an integrated speed follows an angle once a constant speed is taken off: a coarsely truncated speed has
+    one."""
+    from scipy.signal import detrend  # a second to import, and seldom needed
+
+    time = np.arange(len(wanted)) * interval
+    drift, bent, other = np.polyfit(time, got - wanted, 1)[0], detrend(wanted), detrend(got)
+    return bool(abs(drift) < DRIFT and np.ptp(bent) > BENT and _follows(bent, other)[0])
+
+
+def _refuse_unlike(path: str, variable: str, what: str, wanted: np.ndarray, got: np.ndarray) -> None:
+    """Refuse ``got`` unless it follows ``wanted`` with a slope near one."""
+    follows, slope, likeness = _follows(wanted, got)
+    if not follows:
+        raise InputError(
+            f"{path}: {variable} is not {what} (slope {slope:.2g}, correlation {likeness:.2f}); "
+            "sensors, units or signs are mistaken"
+        )
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(3, 3) correlation of the columns of a with those of b."""
+    a, b = a - a.mean(0), b - b.mean(0)
+    scale = np.sqrt(np.outer((a * a).sum(0), (b * b).sum(0)))
+    return (a.T @ b) / np.maximum(scale, 1e-30)
+
+
+def _best_order(score: np.ndarray, margin: float = 0.5) -> tuple[int, ...] | None:
+    """Order of columns with the largest sum of scores; None where the right order is nearly as good."""
+    totals = {order: sum(score[j, m] for j, m in enumerate(order)) for order in permutations(range(3))}
+    best = max(totals, key=lambda o: totals[o])
+    return best if best == (0, 1, 2) or totals[best] > totals[0, 1, 2] + margin else None
+
+
+def _refuse_swapped_phases(path: str, recording: Recording, actuator: ActuatorParameters) -> None:
+    """Voltages regressed on all currents and on all back-EMF shapes show which of them belong to which phase."""
+    theta, dt = recording.rotor_angle, recording.interval
+    middle = 0.5 * (theta[1:] + theta[:-1])
+    half = max(1, round(3e-4 / dt))
+    w = np.gradient(middle, dt)
+    w = np.convolve(w, np.ones(2 * half + 1) / (2 * half + 1), "same")
+    moving = (np.abs(w) > MOVING) & (actuator.pole_pairs * np.abs(w) * dt < LOST)
+    if moving.sum() < 200:
+        return
+    x = actuator.pole_pairs * middle[moving, None] - AXIS
+    shape = np.clip(np.arcsin(np.sin(x)) * 6.0 / np.pi, -1.0, 1.0) * actuator.back_emf * w[moving, None]
+    current = recording.phase_current[1:][moving] * actuator.resistance
+    columns = np.concatenate([current - current.mean(1, keepdims=True), shape, np.ones((len(shape), 1))], axis=1)
+    scale = np.sqrt((columns**2).mean(0))
+    if np.any(scale < 1e-9):
+        return
+    solution, *_ = np.linalg.lstsq(columns / scale, recording.phase_voltage[1:][moving], rcond=1e-6)
+    gains = (solution / scale[:, None]).T  # (phase, column), 1 where all is as the file says
+    of_current = gains[:, :3] - gains[:, :3].mean(1, keepdims=True) + 1.0 / 3.0
+    of_shape = gains[:, 3:6]
+    size = np.sqrt((shape**2).mean())
+    if np.trace(of_current) < -0.5:
+        raise InputError(f"{path}: phase_current has the wrong sign against phase_voltage; it counts into the motor")
+    by_current = _best_order(of_current, 1.0)
+    by_shape = _best_order(of_shape, 1.0) if size > 0.15 else (0, 1, 2)
+    if by_current is None or by_shape is None:
+        return
+    letters = "".join(PHASES[m] for m in (by_current if by_shape == (0, 1, 2) else by_shape))
+    if by_current != (0, 1, 2) and by_shape == (0, 1, 2):
+        raise InputError(
+            f"{path}: phase_current has its phases swapped: phase_voltage a, b, c goes with the currents {letters}"
+        )
+    if by_current != (0, 1, 2):
+        raise InputError(
+            f"{path}: phase_voltage has its phases swapped: a, b, c go with the currents and back-EMFs of {letters}"
+        )
+    if by_shape != (0, 1, 2):
+        raise InputError(
+            f"{path}: rotor_angle does not go with the phases: the back-EMFs of a, b, c are those of {letters}"
+        )
+    if size > 0.15 and np.trace(of_shape) < -1.0:
+        raise InputError(f"{path}: rotor_angle is half an electrical turn off: every back-EMF has the wrong sign")
+
+
+# --- recordings that are whole but of no use -------------------------------------------------------------------------
+
+
+def useless(recording: Recording, actuator: ActuatorParameters):
+    """Yield (variable, rule) for what makes a recording unusable."""
+    theta, dt = recording.rotor_angle, recording.interval
+    travel = float(np.ptp(theta))
+    command = recording.commanded_position
+    if np.ptp(command) < 1e-7 and abs(command[0]) < 1e-7:
+        yield "commanded_position", "never moves; a recording in motion is needed"
+    if travel < LEAST_TRAVEL:
+        yield "rotor_angle", f"never moves (by {travel:.2g} rad); a recording in motion is needed"
+    if dt > SLOWEST_INTERVAL * 1.001:
+        yield "time", f"has an interval of {1e3 * dt:.3g} ms; 1 ms or less is accepted"
+    step = actuator.pole_pairs * np.abs(np.diff(theta))
+    if travel > LEAST_TRAVEL and step[step > LOST].sum() > 0.5 * step.sum():
+        yield "time", "is sampled too slowly: through most of the motion a sample spans more than a commutation sector"
+    speed = min(abs(theta[1] - theta[0]) / dt, float(np.abs(recording.rotor_speed[1])))
+    reached = 2.0 * actuator.back_emf * actuator.current_limit / actuator.inertia * 2.0 * dt  # from rest by then
+    if speed > AT_REST + 1.5 * reached:
+        yield "rotor_speed", f"is {speed:.3g} rad/s at the start; a recording starts at rest"
+    at = float(np.median(recording.output_position[:3]))
+    if abs(at) > START_POSITION:
+        yield "output_position", f"is {at:.3g} rad at the start; a recording starts at zero"
+    yield from clipped(recording)
+    stuck = _longest_constant(theta, np.abs(recording.rotor_speed) > 10.0)
+    if stuck * dt > 5e-3 and stuck > 10:
+        yield "rotor_angle", f"stays exactly the same for {1e3 * stuck * dt:.0f} ms while the rotor turns"
+
+
+def clipped(recording: Recording):
+    """Yield (variable, rule) for channels that sit at one extreme value in a hundredth of the motion or more."""
+    dt, theta = recording.interval, recording.rotor_angle
+    half = max(1, round(1e-3 / dt))
+    w = np.zeros(len(theta))
+    w[half:-half] = (theta[2 * half :] - theta[: -2 * half]) / (2 * half * dt)
+    moving = np.abs(w) > MOVING
+    if moving.sum() < 3 * CLIPPED_LEAST:
+        return
+    least = max(CLIPPED_LEAST, CLIPPED_SHARE * moving.sum())
+    channels = {"phase_voltage": recording.phase_voltage, "phase_current": recording.phase_current}
+    if recording.phase_current_end is not None:
+        channels["phase_current_end"] = recording.phase_current_end
+    for variable, values in channels.items():
+        for j, letter in enumerate(PHASES):
+            for extreme in (np.max, np.min):
+                level, count, beside = _at_extreme(values[moving, j], extreme)
+                if abs(level) > 1e-9 and count > 5 * beside and count >= (least if beside > 1.5 else CLIPPED_FINE):
+                    yield variable, f"clips: phase {letter} is at {level:.4g} in {count} samples"
+    for extreme in (np.max, np.min):
+        level, count, _ = _at_extreme(recording.rotor_speed[moving], extreme)
+        beyond = np.abs(w[moving][recording.rotor_speed[moving] == level]) - abs(level)
+        if count >= CLIPPED_FINE and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
+            yield "rotor_speed", f"clips: {level:.4g} rad/s in {count} samples while the rotor turns faster"
+
+
+def _at_extreme(values: np.ndarray, extreme: Callable) -> tuple[float, int, float]:
+    """Extreme value, how often it occurs, and how often the three values next to it do on average."""
+    distinct, counts = np.unique(values, return_counts=True)
+    if extreme is np.max:
+        distinct, counts = distinct[::-1], counts[::-1]
+    return float(distinct[0]), int(counts[0]), float(np.mean(counts[1:4])) if len(counts) > 1 else float(counts[0])
+
+
+def _longest_constant(values: np.ndarray, where: np.ndarray) -> int:
+    """Longest run of samples that are exactly equal to the one before, where ``where`` holds."""
+    run = best = 0
+    for same in (np.diff(values) == 0.0) & where[1:]:
+        run = run + 1 if same else 0
+        best = max(best, run)
+    return best
