@@ -1,16 +1,20 @@
 """A bench through the installed command: named, written, handed over, retrained with."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
+import numpy as np
 import pytest
 
 from emafault.cli import main
-from emafault.config import compose, retraining_spec
+from emafault.config import compose, diagnosis_spec, retraining_spec
+from emafault.equations.run import diagnose_folder
 from emafault.io.recording import write_recording
 from emafault.reporting.written import SCHEMA_FILE
 from emafault.study.retrain import retrain_network
 
+from .conftest import recorded
 from .test_diagnose import bench
 
 EFFECT = {"magnet_temperature": {"alpha_m": -8e-4}}
@@ -78,3 +82,59 @@ def test_retraining_takes_the_verdict(written):
     found = json.loads((out / "retrained.json").read_text())
     assert found["after"]["rms"] < found["before"]["rms"]
     assert "What retraining brought" in (out / "report.html").read_text()
+
+
+def test_the_same_input_gives_the_same_and_what_is_excluded_is_not_in_the_library(written, verdict):
+    for exclude, out in (([], "again"), (["--exclude", "cogging"], "without")):
+        command = ["diagnose", str(written / "bench"), "--out", str(written / out), "--no-tracking"]
+        assert main([*command, *exclude]) == 0
+    again, without = (json.loads((written / out / "diagnosis.json").read_text()) for out in ("again", "without"))
+    assert again == verdict
+    first, second = ((written / out / "experiment.yaml").read_text() for out in ("out", "again"))
+    assert first == second
+    assert "cogging" in verdict["inclusion"] and "cogging" not in without["inclusion"]
+
+
+def test_a_diagnosis_is_tracked_and_a_tracker_that_fails_breaks_nothing(tmp_path, capsys):
+    write_recording(tmp_path / "single" / "a.nc", recorded())
+    uri = f"sqlite:///{tmp_path}/tracked.db"
+    spec = diagnosis_spec(compose()) | {"tracking": {"uri": uri, "experiment": "emafault"}}
+    verdict = diagnose_folder(tmp_path / "single", spec, tmp_path / "out")
+    assert verdict["shrinks"]["signal"] is None and verdict["recordings"]["confirm"] == []
+    from mlflow import MlflowClient
+
+    client = MlflowClient(tracking_uri=uri)
+    (run,) = client.search_runs([client.get_experiment_by_name("emafault").experiment_id])
+    assert run.info.run_name == "single" and run.data.params["verdict"] == verdict["verdict"]
+    broken = spec | {"tracking": {"uri": "sqlite:////proc/nowhere/x.db", "experiment": "emafault"}}
+    diagnose_folder(tmp_path / "single", broken, tmp_path / "out")
+    assert "not tracked" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nowhere"], "no such file or folder"),
+        (["empty"], "holds no recording"),
+        (["swapped"], "a.nc: phase_current has its phases swapped"),
+        (["swapped", "--twin", "toaster"], "toaster"),
+        (["good", "--exclude", "gremlins"], "gremlins"),
+        (["good", "--experiment", "../up"], "--experiment"),
+        (["good", "--twin", "friction_axis", "--experiment", "mine"], "has no simulator"),
+        (["good", "actuator.gear_ratio=none"], "actuator.gear_ratio"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    good = recorded()
+    write_recording(tmp_path / "good" / "a.nc", good)
+    order = np.array([1, 0, 2])
+    swapped = replace(
+        good, phase_current=good.phase_current[:, order], phase_current_end=good.phase_current_end[:, order]
+    )
+    write_recording(tmp_path / "swapped" / "a.nc", swapped)
+    assert main(["diagnose", *arguments, "--no-tracking"]) == 2
+    error = capsys.readouterr().err.strip()
+    assert said in error and "\n" not in error
+    assert not (tmp_path / "results").exists()
