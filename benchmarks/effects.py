@@ -17,10 +17,10 @@ import numpy as np
 
 import emafault.actuator.kernel as kernel
 from emafault.actuator.commands import command_positions
-from emafault.actuator.compiled import OPTIONS
 from emafault.actuator.conduction import LANES
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.state import RUN_STATE
+from emafault.compiled import OPTIONS
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
 

@@ -16,9 +16,9 @@ from emafault.actuator.commands import command_positions
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise, measure
 from emafault.actuator.simulate import simulate
+from emafault.closed_form import inverse
 from emafault.config import reference_actuator
 from emafault.faults import sample_faults
-from emafault.identification.closed_form import inverse
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.bounds import cramer_rao_bound
 

@@ -9,7 +9,6 @@ import numpy as np
 from .errors import InputError
 
 FAULT_NAMES = ("Na", "Nb", "Nc", "xi_x", "xi_y", "dT")
-FAULT_UNITS = ("1", "1", "1", "1", "1", "K")
 #: the seed paper's worked example
 WORKED_EXAMPLE = (0.0375, 0.0504, 0.0507, 0.0059, 2.8e-5, 4.0)
 

@@ -6,7 +6,6 @@ several processes create or migrate one.
 
 import contextlib
 import fcntl
-import json
 import logging
 import os
 import re
@@ -152,8 +151,3 @@ def _client(uri: str) -> Iterator[Any]:
         except (MlflowException, OSError) as error:
             reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())
             raise InputError(f"tracking.uri: {uri} cannot be used ({reason[:300]})") from error
-
-
-def read_tracked(path: str | Path) -> dict[str, Any]:
-    """What a tracking rule wrote: the address, experiment and run."""
-    return json.loads(Path(path).read_text())

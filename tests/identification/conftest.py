@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from emafault import closed_form
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.config import reference_actuator
 from emafault.faults import sample_faults
-from emafault.identification import closed_form
 from emafault.identification.evaluation import FeatureSet, fault_range
 
 RANGES = {"shorted_turns": (0.0, 0.1), "eccentricity": (0.0, 0.2), "temperature": (-50.0, 70.0)}

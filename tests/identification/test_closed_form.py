@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from emafault import closed_form
 from emafault.faults import WORKED_EXAMPLE, sample_faults
-from emafault.identification import closed_form
 
 from .conftest import RANGES
 

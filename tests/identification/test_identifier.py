@@ -143,8 +143,8 @@ def test_intervals_know_that_a_reference_record_is_noisy_too(fitted, fresh, actu
 
 
 def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):
+    from emafault import closed_form
     from emafault.faults import sample_faults
-    from emafault.identification import closed_form
 
     from .conftest import RANGES
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from emafault.closed_form import forward
 from emafault.errors import InputError
-from emafault.identification.closed_form import forward
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.angle_resolved import harmonic_shapes, overlaps, stretch_centres
 from emafault.reconstruction.rows import Rows

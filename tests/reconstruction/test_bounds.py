@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from emafault.closed_form import inverse
 from emafault.errors import InputError
-from emafault.identification.closed_form import inverse
 from emafault.reconstruction.bounds import cramer_rao_bound, feature_covariance
 from emafault.reconstruction.features import read_signals
 from emafault.reconstruction.noise import NoiseLevels
@@ -57,7 +57,7 @@ def test_faults_follow_from_features_by_the_inverse():
     """Propagation by derivatives agrees with a sample drawn from the features' covariance."""
     faults, _, clean = recordings(2)
     bound = cramer_rao_bound(clean, 2e-4, ACTUATOR, LEVELS, {})
-    from emafault.identification.closed_form import forward
+    from emafault.closed_form import forward
 
     six = np.concatenate(forward(faults, ACTUATOR), axis=1)[0]
     drawn = np.random.default_rng(0).multivariate_normal(six, bound.features[0], 20000)

@@ -8,8 +8,8 @@ import pytest
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import measure
 from emafault.actuator.simulate import simulate, time_axis
+from emafault.closed_form import forward, inverse
 from emafault.errors import InputError
-from emafault.identification.closed_form import forward, inverse
 from emafault.io.recording import Recording
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.calibration import calibrate, calibrate_recordings

@@ -5,8 +5,8 @@ import pytest
 
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
+from emafault.closed_form import forward, inverse
 from emafault.errors import InputError
-from emafault.identification.closed_form import forward, inverse
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.bounds import cramer_rao_bound
 from emafault.reconstruction.least_squares import unwhiten, whiten

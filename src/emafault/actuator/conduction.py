@@ -5,7 +5,7 @@ lanes in one instruction what would else keep it waiting for one result after th
 other.
 """
 
-from .compiled import compiled, compiled_inline
+from ..compiled import compiled, compiled_inline
 
 NEVER = 1.0e30
 LARGEST_CHANGE = 0.2  # of a saturating inductance, or of a current by its own decay, within a segment

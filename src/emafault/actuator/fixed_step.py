@@ -10,9 +10,9 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..compiled import compiled
 from ..effects import EFFECTS
 from ..errors import InputError
-from .compiled import compiled
 from .unlisted import acting, no_terms, remembered
 
 #: effects that have an alternative form; the position in this tuple is the flag's index in the kernel

@@ -9,7 +9,7 @@ integrals of the series. It also runs uncompiled (NUMBA_DISABLE_JIT=1), to be st
 
 import numpy as np
 
-from .compiled import compiled, compiled_inline
+from ..compiled import compiled, compiled_inline
 from .conduction import (
     BUS_FILTER,
     CURRENT_TOLERANCE,

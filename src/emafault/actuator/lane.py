@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .compiled import compiled_inline
+from ..compiled import compiled_inline
 from .conduction import (
     ANGLE,
     AREA,

@@ -6,7 +6,7 @@ change; the simulation only has to notice when the rotor passes from one cell to
 
 import numpy as np
 
-from .compiled import compiled
+from ..compiled import compiled
 
 TWO_PI = 2.0 * np.pi
 AXIS = np.array([0.0, TWO_PI / 3.0, 2.0 * TWO_PI / 3.0])  # alpha_j, electrical rad

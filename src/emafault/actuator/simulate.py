@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ..compiled import attributed
 from ..errors import InputError
-from .compiled import attributed
 from .conduction import LANES
 from .kernel import run_batch
 from .state import RUN_STATE, has_extras

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .compiled import compiled
+from ..compiled import compiled
 from .conduction import NEVER
 from .friction import coulomb_torque, static_limit
 from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, phase_constants

@@ -6,7 +6,7 @@ The event-driven run knows nothing of them, so that a nominal run pays nothing. 
 
 import numpy as np
 
-from .compiled import compiled
+from ..compiled import compiled
 
 #: where a term acts: added to the driving torque (N m), to a phase's back-EMF as a share of it, to its resistance (ohm)
 PLACES = ("torque", "emf_a", "emf_b", "emf_c", "resistance_a", "resistance_b", "resistance_c")

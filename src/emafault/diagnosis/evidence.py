@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.special import log_ndtr
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 
 MANY = 32  # rows from which on a matrix is factored along its rows
 SEVERAL = 200  # nuisances from which on those of each recording are integrated out by themselves

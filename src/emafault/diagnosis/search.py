@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from scipy.special import ndtr
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
 from .model import Unit
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 
 LEFT_OUT = 1e8  # times a row's variance where it is not used
 OUTLIER = 5.5  # standard deviations of a full model's residual

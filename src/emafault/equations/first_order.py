@@ -1,6 +1,6 @@
 """A first-order filter along a signal."""
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 
 LONGEST = 5e-5  # s, of a step of the integration
 

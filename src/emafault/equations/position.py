@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 from .acquisition import recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name

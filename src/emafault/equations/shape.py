@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..actuator.compiled import compiled
 from ..actuator.motor import TWO_PI
+from ..compiled import compiled
 
 
 @compiled

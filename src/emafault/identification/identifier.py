@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from .. import closed_form
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
-from . import closed_form
 from .intervals import ConformalIntervals
 from .network import Network
 from .settings import NetworkSettings, TrainingSettings

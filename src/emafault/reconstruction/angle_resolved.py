@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
+from ..closed_form import PHASE_AXIS
 from ..errors import InputError
-from ..identification.closed_form import PHASE_AXIS
 from .features import Features, Signals, check_number, read_settings
 from .least_squares import EMF, PhaseFit, is_singular, row_variance, whiten
 from .noise import NoiseLevels

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..actuator.parameters import ActuatorParameters
+from ..closed_form import inverse, jacobian, propagate
 from ..errors import InputError
-from ..identification.closed_form import inverse, jacobian, propagate
 from .features import Signals, check_number, read_settings, read_signals
 from .least_squares import CURRENT, EMF, design, row_variance
 from .noise import NoiseLevels, stated_noise

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
+from ..closed_form import ECCENTRICITY_AXES, propagate
 from ..errors import InputError
-from ..identification.closed_form import ECCENTRICITY_AXES, propagate
 from ..io.recording import Recording
 from .features import Features, join_features
 

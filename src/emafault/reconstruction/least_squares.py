@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..actuator.compiled import compiled
+from ..compiled import compiled
 from .noise import NoiseLevels
 from .rows import Rows
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from ..actuator.compiled import compiled
 from ..actuator.parameters import ActuatorParameters
+from ..compiled import compiled
 from ..errors import InputError
 from .features import Features, Signals, check_number, read_settings
 

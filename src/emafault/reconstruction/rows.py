@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..actuator.compiled import compiled
-from ..identification.closed_form import PHASE_AXIS
+from ..closed_form import PHASE_AXIS
+from ..compiled import compiled
 from .features import Signals
 
 OFF_HALF_WIDTH = np.pi / 6.0  # of the inverter's off sector, electrical rad

@@ -6,7 +6,7 @@ currents and torque weighed by their orders of the rotor angle.
 
 import numpy as np
 
-from ..actuator.compiled import compiled, compiled_inline
+from ..compiled import compiled, compiled_inline
 
 ALPHA = np.arange(3) * 2.0 * np.pi / 3.0
 TIME_BINS, ANGLE_BINS = 12, 24

@@ -9,6 +9,8 @@ import pytest
 
 from emafault.io.recording import write_recording
 
+from .conftest import recorded
+
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.workflow
 
@@ -19,9 +21,8 @@ def _plan(folder, *arguments):
     return subprocess.run([*command, *arguments], capture_output=True, text=True, env=environment, timeout=120)
 
 
-def test_a_bench_is_diagnosed_then_retrained_and_without_one_the_call_is_refused_in_a_line(tmp_path, plain):
-    for name, recording in plain.items():
-        write_recording(tmp_path / "mine" / name, recording)
+def test_a_bench_is_diagnosed_then_retrained_and_without_one_the_call_is_refused_in_a_line(tmp_path):
+    write_recording(tmp_path / "mine" / "a.nc", recorded())
     planned = _plan(tmp_path, "retrain", "--config", f"bench={tmp_path / 'mine'}")
     assert planned.returncode == 0, planned.stderr
     text = planned.stdout + planned.stderr

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..actuator.parameters import ActuatorParameters
+from .actuator.parameters import ActuatorParameters
 
 PHASE_AXIS = 2.0 * np.pi / 3.0 * np.arange(3)
 #: columns of (xi_x, xi_y) -> g_j - 1 of the ``stator_fixed`` law, (phase, 2)

@@ -5,9 +5,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-_SOURCES = sorted(Path(__file__).parent.glob("*.py")) + sorted(
-    (Path(__file__).resolve().parents[3] / "conf" / "effect").glob("*.yaml")
-)
+_HERE = Path(__file__).resolve()
+_SOURCES = [
+    _HERE,
+    *sorted((_HERE.parent / "actuator").glob("*.py")),
+    *sorted((_HERE.parents[2] / "conf" / "effect").glob("*.yaml")),
+]
 
 
 def source_digest() -> str:
