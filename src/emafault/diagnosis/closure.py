@@ -1,10 +1,11 @@
 """How far the gap shrinks on recordings that took no part: the ladder of root mean squares of the whitened residual."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from .evidence import Reduced
+from .evidence import Definite, Reduced
 from .fit import Bench, Inserted, is_parameter
 from .linear import White, assemble, compressed, white_rows
 from .linearisation import SETTINGS
@@ -71,9 +72,9 @@ class Ladder:
             return white_rows(block, free, remainders)
         left = any(n.startswith(f"remainder.{block.equation}.") for n in inserted.beside)
         own = inserted.own if block.equation not in SETTINGS else None
-        names, found = white_rows(block, free, left, own)
+        names, found = white_rows(block, free, left or remainders, own)
         found[:, -1] += found[:, :-1] @ np.array([inserted.beside.get(n, 0.0) for n in names])
-        kept = [k for k, n in enumerate(names) if is_parameter(n)]
+        kept = [k for k, n in enumerate(names) if is_parameter(n) or (remainders and n.startswith("remainder."))]
         return [names[k] for k in kept], np.ascontiguousarray(found[:, [*kept, -1]])
 
 
@@ -87,8 +88,29 @@ def rows(whites: Sequence[White]) -> int:
     return sum(w.count for w in whites)
 
 
-def placebo(explored: Reduced, confirm: Sequence[White], equations: Sequence[str], size: int) -> float:
-    """Median root mean square on the confirm recordings with random signatures fitted to the explored ones.
+def coefficients(whites: Sequence[White]) -> tuple[float, int]:
+    """Root mean square of what blocks with remainders still ask for in the coefficients of their equations' drivers,
+    over its standard error, and the number of these coefficients; (nan, 0) without any."""
+    total, count = 0.0, 0
+    for w in whites:
+        k = [
+            i
+            for i, n in enumerate(w.names)
+            if n.startswith("remainder.") and n.endswith(".0") and n.split(".")[2] != "0"
+        ]
+        k = [i for i in k if w.gram[i, i] > 0.0]
+        if k:
+            M, b = w.gram[np.ix_(k, k)], w.gram[k, -1]
+            total += float(b @ Definite(M).solve(b))
+            count += len(k)
+    return (float(np.sqrt(total / count)), count) if count else (float("nan"), 0)
+
+
+def placebo(
+    explored: Reduced, confirm: Sequence[White], equations: Sequence[str], size: int
+) -> tuple[float, list[White]]:
+    """Median root mean square on the confirm recordings with random signatures fitted to the explored ones, and the
+    blocks of the draw next to it.
 
     Parameters
     ----------
@@ -101,7 +123,7 @@ def placebo(explored: Reduced, confirm: Sequence[White], equations: Sequence[str
     names = [n for n in every if n.split(".")[1] in equations and n in explored.index]
     base = float(sum(w.gram[-1, -1] for w in confirm))
     if not names or size < 1:
-        return rms(confirm)
+        return rms(confirm), list(confirm)
     held = assemble(confirm, names, {})
     k = np.array([explored.index[n] for n in names])
     M, b = explored.M[np.ix_(k, k)], explored.b[k]
@@ -111,8 +133,17 @@ def placebo(explored: Reduced, confirm: Sequence[White], equations: Sequence[str
     for _ in range(PLACEBOS):
         C = scale[:, None] * rng.standard_normal((len(names), size))
         a = C @ np.linalg.lstsq(C.T @ M @ C, C.T @ b, rcond=None)[0]
-        found.append(max(base + 2.0 * held.g @ a + a @ held.H @ a, 0.0))
-    return float(np.sqrt(np.median(found) / max(rows(confirm), 1)))
+        found.append((max(base + 2.0 * held.g @ a + a @ held.H @ a, 0.0), a))
+    middle = sorted(found, key=lambda x: x[0])[PLACEBOS // 2][1]
+    median = float(np.sqrt(np.median([x for x, _ in found]) / max(rows(confirm), 1)))
+    return median, [_added(w, dict(zip(names, middle, strict=True))) for w in confirm]
+
+
+def _added(white: White, amounts: Mapping[str, float]) -> White:
+    """A block with amounts of its own columns added to its residual."""
+    turn = np.eye(len(white.gram))
+    turn[:-1, -1] = [amounts.get(n, 0.0) for n in white.names]
+    return replace(white, gram=turn.T @ white.gram @ turn)
 
 
 def closed(recalibrated: float, after: float, floor: float, count: int) -> float | None:

@@ -16,7 +16,7 @@ FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
-OTHER_FORM = 10  # added to a variant's number, once or twice, where the unit takes a form of its own, far or near
+OTHER_FORM = 10  # added to a variant's number, once for each kind of own form that the unit may take
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 TINY = 1e-12  # probability that counts as none
 BEAM = 4
@@ -85,6 +85,9 @@ class Search:
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
         self.tempering = 1.0
         self.corrections = corrections or {}
+        self.shapes: dict[str, int] = {}  # kinds of own form that a unit may take
+        for unit, variant in candidates:
+            self.shapes[unit] = max(self.shapes.get(unit, 0), variant // OTHER_FORM)
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
         self.counts = listed, every.count("form"), every.count("remainder")
@@ -198,12 +201,13 @@ class Search:
         listed = sum(k in ("structural", "calibration") for k in kinds)
         forms, left = kinds.count("form"), kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
-        own = sum(v >= OTHER_FORM for _, v in members)
+        own = [u for u, v in members if v >= OTHER_FORM]
         if listed >= len(self.size_prior) or forms >= len(FORM_PRIOR):
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
-        value += own * np.log(OTHER_FORM_PRIOR / 12.0) + (listed + forms - own) * np.log(1.0 - OTHER_FORM_PRIOR)
+        value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
+        value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search

@@ -26,7 +26,7 @@ def rows_of(state: State, j: int) -> np.ndarray:
 
 
 def _rows_of(rec, j: int) -> np.ndarray:
-    low, high, _ = _sweep(rec, j)
+    low, high, _ = sweep(rec, j)
     half = high - low < np.pi / 3.0
     a = rec.actuator
     passing = 2.0 * a.inductance * np.abs(rec.current[:, STAYS[j]]) / a.bus_voltage  # s, about
@@ -34,7 +34,7 @@ def _rows_of(rec, j: int) -> np.ndarray:
     return np.flatnonzero((low < REACH) & (high > -REACH) & rec.moving & half & short)
 
 
-def _sweep(rec, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sweep(rec, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Electrical angle from the nearest edge at the lower and upper end of each interval, and the middle's."""
     poles = rec.actuator.pole_pairs
     middle = poles * rec.middle - rec.axis[j] - EDGE
@@ -66,7 +66,7 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     """Intervals of phase j, their ends from the nominal edge, and where the current passes over (electrical rad)."""
     rec, p = state.rec, state.p
     rows = rows_of(state, j)
-    low, high = rec.once(("ends", j), lambda: tuple(x[rows] for x in _sweep(rec, j)[:2]))
+    low, high = rec.once(("ends", j), lambda: tuple(x[rows] for x in sweep(rec, j)[:2]))
     early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)

@@ -1,7 +1,8 @@
 """The current that flows against the current that the controller asks for; gains and limits are the controller's own.
 
 Everything that the controller sees is recorded: command, output position, speed. Half the sum of the absolute phase
-currents is the pair's current, through commutations too. Rows are means over ``BLOCK`` and differenced, which takes the
+currents, less half of what still flows in a phase that has been switched off, is the current of the pair that the
+comparator sees. Rows are means over ``BLOCK`` and differenced, which takes the
 random walk out that the integral makes of the sensors' noise.
 """
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.commands import with_corners
-from . import position
+from . import commutation, position
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -53,7 +54,7 @@ def residual(state: State) -> Dual:
         late = late + m.delay(p.of(effect_name(m)))
     asked_for = asked_for - late * np.gradient(np.asarray(asked_for.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    pair = rec.level * sign
+    pair = (rec.level - _fading(state)) * sign
     width = block_length(rec)
     out = a.speed_gain * (_calmed(pair, h) / gain - asked_for)
     return out.linear(lambda x: _blocks(x, width), rec.size)
@@ -61,6 +62,38 @@ def residual(state: State) -> Dual:
 
 def _calmed(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(SPEED_SPAN / h), mode="nearest")
+
+
+def _fading(state: State) -> np.ndarray:
+    """(sample,) half the mean current of the phase that a commutation has switched off (A).
+
+    Its diode and the star point take a third of the supply's voltage from it, and two thirds of the back-EMF: a
+    current i is gone after 3 L i / (Vdc + 2 k w).
+    """
+    rec, a = state.rec, state.rec.actuator
+    charge = 0.75 * a.inductance * rec.level**2 / _supply(rec, np.sign(state.drive))
+    edges = np.zeros(rec.size)
+    for j in range(3):
+        low, high, _ = commutation.sweep(rec, j)
+        edges += (low < 0.0) & (high >= 0.0) & rec.moving
+    return edges * charge / rec.interval
+
+
+def _lacking(rec, sign: np.ndarray) -> np.ndarray:
+    """(sample,) what the pair's current lacks on average while a phase that has been switched on takes over (A).
+
+    Half the current is to be made up, by what the back-EMF leaves of the supply.
+    """
+    a = rec.actuator
+    charge = 0.25 * a.inductance * rec.level**2 / _supply(rec, -sign)
+    return charge * 6.0 * a.pole_pairs * np.abs(rec.speed) / (2.0 * np.pi)
+
+
+def _supply(rec, sign: np.ndarray) -> np.ndarray:
+    """(sample,) voltage of the supply, the back-EMF of two phases added where it goes with ``sign`` (V)."""
+    a = rec.actuator
+    back_emf = 2.0 * a.back_emf * np.abs(rec.speed) * sign * np.sign(rec.speed)
+    return np.maximum(a.bus_voltage + back_emf, HEADROOM * a.bus_voltage)
 
 
 def _at_limit(rec) -> np.ndarray:
@@ -119,12 +152,12 @@ def late(state: State) -> np.ndarray:
 
 
 def usable(state: State) -> np.ndarray:
-    """(block,) where the rotor turns and no limit may be reached at random."""
+    """(block,) where the rotor turns, no limit may be reached at random and no average looks beyond the record."""
     rec = state.rec
-    return rec.once(("control.usable",), lambda: _usable(rec))
+    return rec.once(("control.usable",), lambda: _usable(rec, np.sign(state.drive)))
 
 
-def _usable(rec) -> np.ndarray:
+def _usable(rec, sign: np.ndarray) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
@@ -133,16 +166,20 @@ def _usable(rec) -> np.ndarray:
     # through zero the mean of a magnitude is not the magnitude of the mean
     level = rec.level[: count * width].reshape(count, width)
     known = moving & free & (level.min(axis=1) > rec.actuator.hysteresis)
-    return known[1:] & known[:-1]
+    sign = sign[: count * width].reshape(count, width)
+    known &= sign.min(axis=1) == sign.max(axis=1)
+    reach = (odd(AVERAGED / rec.interval) + odd(SPEED_SPAN / rec.interval)) // 2
+    known[: -(-reach // width)] = known[count - -(-reach // width) :] = False
+    return known[1:] & known[:-1] & (sign[1:, 0] == sign[:-1, -1])
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (A2): of the current, and of what the controller saw, through its law."""
     rec = state.rec
-    return rec.once(("control.noise_bands",), lambda: _noise_bands(rec))
+    return rec.once(("control.noise_bands",), lambda: _noise_bands(rec, np.sign(state.drive)))
 
 
-def _noise_bands(rec) -> list[np.ndarray]:
+def _noise_bands(rec, sign: np.ndarray) -> list[np.ndarray]:
     a, s = rec.actuator, rec.noise
     h, width = rec.interval, block_length(rec)
     count = rec.size // width - 1
@@ -150,6 +187,7 @@ def _noise_bands(rec) -> list[np.ndarray]:
     change = np.abs(np.diff(level, append=level[-1:])) / width
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2
+    white = white + _means(_lacking(rec, sign), width) ** 2
     bands: list[np.ndarray | float] = [white[1:] + white[:-1], -white[1:-1]]
     averaged, calm = odd(AVERAGED / h), odd(SPEED_SPAN / h)
     size = 2 * (averaged + calm) + 8 * width

@@ -10,9 +10,10 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..diagnosis.closure import Ladder, closed, placebo, rms, rows
+from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
 from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit, is_parameter
+from ..diagnosis.linear import White
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
@@ -20,6 +21,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
+from . import electrical
 from .held_out import held_to_account
 from .machine import FAULTS, ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
@@ -381,22 +383,45 @@ def _shrinks(
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
-    best = ladder.blocks(after, also=mine, inserted=inserted)
+    best = ladder.blocks(after, remainders=True, also=mine, inserted=inserted)
+    at_nominal = ladder.blocks(nominal, remainders=True)
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
     at_null = null.reduce(null.normal(null.linearise()))
+    median, middle = placebo(at_null, base, equations, len(mine))
     signal: dict[str, float | None] = {
-        "nominal": rms(ladder.blocks(nominal)), "recalibrated": rms(base),
-        "placebo": placebo(at_null, base, equations, len(mine)), "after": rms(best), "floor": 1.0,
+        "nominal": rms(at_nominal), "recalibrated": rms(base),
+        "placebo": median, "after": rms(best), "floor": 1.0,
     }  # fmt: skip
     signal["closed"] = closed(rms(base), rms(best), 1.0, count)
+    features = _feature_ladder(at_nominal, base, middle, best)
     for entry in found:
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
             own = {p.name: after[p.name] for p in form.parameters}
             entry["closed"] = closed(rms(base), rms(ladder.blocks(recalibrated | own, also=list(own))), 1.0, count)
-    return {"signal": signal, "features": None, "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings)}
+    return {
+        "signal": signal,
+        "features": features,
+        "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings),
+    }
+
+
+def _feature_ladder(
+    nominal: list[White], base: list[White], placebos: list[White], best: list[White]
+) -> dict[str, float | None] | None:
+    """Resistance and back-EMF coefficient of each phase and recording less the model's, over their standard errors."""
+    found = {
+        stage: coefficients([w for w in whites if w.equation in electrical.NAMES])
+        for stage, whites in (("nominal", nominal), ("recalibrated", base), ("placebo", placebos), ("after", best))
+    }
+    count = found["recalibrated"][1]
+    if not count:
+        return None
+    ladder: dict[str, float | None] = {stage: value for stage, (value, _) in found.items()}
+    share = closed(found["recalibrated"][0], found["after"][0], 1.0, count)
+    return ladder | {"floor": 1.0, "closed": share}
 
 
 def _blocks_of(equation: str) -> tuple[str, ...]:

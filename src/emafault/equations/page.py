@@ -64,9 +64,8 @@ def _fitted(entry: Mapping[str, Any]) -> str:
 
 def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) -> Page:
     """The page of one diagnosis."""
-    from ..reporting import (
-        diagnosis as figures,  # what draws takes half a second to import, and the verdict does not wait
-    )
+    # what draws takes half a second to import, and the verdict does not wait
+    from ..reporting import diagnosis as figures
 
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):

@@ -36,7 +36,7 @@ def ladder(explored: "Fitted", opened: Recorded, confirm: Sequence[str]) -> dict
         "placebo": placebo(
             explored.at_base, base, sorted({w.equation for w in base}),
             sum(is_parameter(n) for n in leading.deviations),
-        ),
+        )[0],
         "after": after, "floor": 1.0,
     }  # fmt: skip
     return signal | {"closed": closed(rms(base), after, 1.0, rows(base))}

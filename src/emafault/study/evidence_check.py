@@ -173,8 +173,9 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
     for unit in map(str, chosen):
         variants = [v for u, v in bench.candidates if u == unit and v < OTHER_FORM]
         m = unit, int(rng.choice(variants))
-        other = (unit, m[1] + OTHER_FORM) in bench.candidates and rng.random() < OTHER_FORM_PRIOR
-        m = (unit, m[1] + OTHER_FORM) if other else m
+        others = [v for u, v in bench.candidates if u == unit and v >= OTHER_FORM and v % OTHER_FORM == m[1]]
+        other = bool(others) and rng.random() < OTHER_FORM_PRIOR
+        m = (unit, int(rng.choice(others))) if other else m
         c = bench.candidates[m]
         members[m] = float(rng.choice(c.widths))
         k = bench.rest[c.index]
