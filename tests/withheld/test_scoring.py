@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.errors import InputError
-from emafault.withheld import verdicts
+from emafault.withheld import scoreboard, verdicts
 from emafault.withheld.cases import draw_case
 from emafault.withheld.metrics import area_under_curve, calibration_error
 from emafault.withheld.scoreboard import write_scoreboard
@@ -235,3 +235,15 @@ def test_a_broken_verdict_is_named(tmp_path):
     (tmp_path / "diagnosis.json").write_text("{}")
     with pytest.raises(InputError, match=r"diagnosis\.json"):
         verdicts.read_verdict(tmp_path / "diagnosis.json")
+
+
+def test_changes_put_into_measured_recordings_stand_apart_from_effects_left_out():
+    row = {"twin": "friction_axis", "case": "emps", "named": ["stribeck"], "right": True, "verdict": "explained"}
+    rows = [
+        row | {"kind": "put in", "what": "friction higher at low speed"},
+        row | {"kind": "left out", "what": "viscous_asymmetry", "named": [], "verdict": "unknown"},
+        row | {"kind": "left out", "what": "stribeck", "named": [], "verdict": "partly", "right": False},
+    ]
+    page = scoreboard._measured(rows)
+    assert "1 of 1 right; 0 with the word unknown" in page and "1 of 2 right; 1 with the word unknown" in page
+    assert scoreboard._measured([]) == ""
