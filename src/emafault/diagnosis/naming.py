@@ -57,6 +57,7 @@ def read(
             unknown += float(w)
         else:
             empty += float(w)
+    inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
     groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})

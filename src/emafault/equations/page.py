@@ -50,7 +50,12 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
     signal = verdict["shrinks"]["signal"]
     if signal and signal["closed"] is not None:
-        out.append(f"On recordings not looked at before this closes {100 * signal['closed']:.0f} % of the gap.")
+        share = 100 * min(signal["closed"], 1.0)
+        out.append(
+            f"On recordings not looked at before this closes {share:.0f} % of the gap."
+            if share > 0.0
+            else "On recordings not looked at before this closes nothing of the gap."
+        )
     return out
 
 
