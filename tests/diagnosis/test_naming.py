@@ -50,14 +50,18 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
 
 
 def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch):
-    everything = [model(0.0, "load"), model(-50.0)]
-
+    everything = SimpleNamespace(
+        models=[model(0.0, "load_spring"), model(-50.0)],
+        search=SimpleNamespace(
+            fit=lambda members: model(-50.0, *(u for u, _ in members)), candidates={("remainder:torque", 0): None}
+        ),
+    )
     search = SimpleNamespace(fit=lambda members: model(-2.0))
-    explored = SimpleNamespace(models=[model(0.0, "load"), model(-2.0)], search=search)
-    misfit = {("load",): 130.0, (): 100.0}
+    explored = SimpleNamespace(models=[model(0.0, "load_spring"), model(-2.0)], search=search)
+    misfit = {("load_spring",): 130.0, (): 100.0}
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
-    kept, ratios = held_out.held_to_account(everything, ["load"], None, None, explored)
-    assert ratios == {"load": -15.0} and kept[0].units == ()
-    misfit["load",] = 80.0
-    kept, ratios = held_out.held_to_account(everything, ["load"], None, None, explored)
-    assert ratios == {"load": 10.0} and kept[0].units == ("load",)
+    kept, ratios = held_out.held_to_account(everything, ["load_spring"], None, None, explored)
+    assert ratios == {"load_spring": -15.0} and kept[0].units == ("remainder:torque",)
+    misfit["load_spring",] = 80.0
+    kept, ratios = held_out.held_to_account(everything, ["load_spring"], None, None, explored)
+    assert ratios == {"load_spring": 10.0} and kept[0].units == ("load_spring",)

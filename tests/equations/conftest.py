@@ -20,6 +20,7 @@ COMMANDS = {
     "reversal": {"amplitude": 0.04, "speed": 0.25},
     "sine": {"amplitude": 0.02, "frequency": 2.0},
 }
+STEP = {"step": {"amplitude": 0.012, "time": 0.02}}
 
 
 def recorded(
@@ -34,7 +35,7 @@ def recorded(
 ):
     """A recording of a unit with these effects and faults."""
     runs = make_runs(actuator, np.array([fault]), effects=effects or {}, theta_0=theta_0)
-    position = command_positions(command, COMMANDS[command], 0.8, actuator.control_period)
+    position = command_positions(command, (COMMANDS | STEP)[command], 0.8, actuator.control_period)
     out = measure(simulate(runs, position, 0.8, interval), runs, NOISE, seed)
     ambient = float(out.pop("ambient_temperature")[0])
     return Recording(

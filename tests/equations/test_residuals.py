@@ -100,6 +100,16 @@ def test_white_at_the_simulated_point(command, theta_0):
     assert found["control"] < 1.5 and found["commutation"] < 3.0
 
 
+@pytest.mark.parametrize("theta_0", [0.7, 2.1])
+def test_the_control_law_holds_where_a_step_is_braked(theta_0):
+    recording = recorded("step", interval=5e-5, theta_0=theta_0)
+    machine = machine_of({"a.nc": recording})
+    block = next(b for b in machine.blocks(truth(machine, recording), "a.nc") if b.equation == "control")
+    assert block.usable.sum() > 10
+    # the changes add up to that from the first row to the last: 0.04 A where what a commutation adds is left out
+    assert abs(block.residual[block.usable].sum()) < 0.015
+
+
 @pytest.mark.parametrize("effect", SIZES)
 def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     given, equation = SIZES[effect]

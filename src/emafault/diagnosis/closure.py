@@ -40,6 +40,7 @@ class Ladder:
         remainders and own forms of a fitted set out of what is left.
         """
         out: list[White] = []
+        shaped = {n for amounts in (inserted.own.values() if inserted else ()) for n in amounts}
         for recording in self.recordings:
             free = [
                 n for n in self.parameters
@@ -50,7 +51,7 @@ class Ladder:
                 last = step == STEPS
                 whites = [
                     compressed(b, *self._rows(b, free, remainders and last, inserted), weights.get(b.equation))
-                    for b in self.machine.blocks(mine, recording, wanted=free)
+                    for b in self.machine.blocks(mine, recording, wanted=[*free, *shaped])
                 ]
                 if last:
                     out += whites

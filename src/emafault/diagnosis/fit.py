@@ -20,6 +20,7 @@ CARRYING = 6  # units that carry their own form
 OWN_SHARES = (1.0, 0.2)  # of the largest own form: as far from the library's as a form is, or near it
 STILL = 0.3  # prior standard deviations by which the point may still move
 REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
+FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
 
 
@@ -90,6 +91,7 @@ class Bench:
         for n, p in self.parameters.items():
             if p.alias is not None:
                 self._beyond.setdefault(p.alias, []).append(n)
+        self._inserted: dict[tuple, Inserted] = {}
         self.workers: Workers | None = None
         self.remainders: dict[str, Unit] = {}
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
@@ -121,12 +123,10 @@ class Bench:
                 out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
         return out
 
-    def linearise(
-        self, model: Model | None = None, renew: bool = False, known: Sequence[White] = (), corrected: bool = True
-    ) -> list[White]:
+    def linearise(self, model: Model | None = None, renew: bool = False, corrected: bool = True) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
-        ``renew`` takes the weights from what a full model leaves there; blocks ``known`` at this point are taken over.
+        ``renew`` takes the weights from what a full model leaves there.
         ``corrected`` takes out what the noise in the regressors adds.
         """
         columns, aliases = self._columns_of(model)
@@ -135,12 +135,11 @@ class Bench:
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
         task = Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
-        names = [n for n in self.recordings if n not in {w.recording for w in known}]
         if not renew:
-            return [*known, *self._each(task, names)]
-        whites = [*known, *self._each(replace(task, again=True, corrected=False), names)]
+            return self._each(task, self.recordings)
+        whites = self._each(replace(task, again=True, corrected=False), self.recordings)
         full = full_model(whites, self._full_prior(columns, aliases))
-        return [*known, *self._each(replace(task, full=full), names)]
+        return self._each(replace(task, full=full), self.recordings)
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""
@@ -199,18 +198,21 @@ class Bench:
 
     def _carry_own_forms(self, search: Search) -> bool:
         """Units of the leading set, then those that explain most alone, may take another form than the library's, in
-        proportion to their size; whether any does that did not before."""
+        proportion to their size; whether any of the leading set does that did not before."""
+        before = self.sizes
+        leading = search.ranked()[0]
+        if before and {c.unit for c in leading.choices if self._kind(c.unit) in LISTED} <= set(before):
+            return False
         nothing = search.fit(())
         alone = [search.fit((m,)) for m in search.candidates if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM]
         good = [m for m in alone if m.log_posterior > nothing.log_posterior]
-        before = self.sizes
         self.sizes = {}
-        for model in [search.ranked()[0], *sorted(good, key=lambda m: -m.log_posterior)]:
+        for model in [leading, *sorted(good, key=lambda m: -m.log_posterior)]:
             for choice in model.choices:
                 if len(self.sizes) < CARRYING and self._kind(choice.unit) in LISTED and choice.unit not in self.sizes:
                     names = self.names_of(choice)
                     self.sizes[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
-        return not set(self.sizes) <= set(before)
+        return bool(self.sizes)
 
     def names_of(self, choice: Choice) -> list[str]:
         """Columns of a unit's variant at the present point."""
@@ -442,8 +444,11 @@ class Bench:
             self.point |= {n: v for n, v in fit.values.items() if n in self.point}
             self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
             self.carried |= fit.carried
-            whites = self.linearise(renew=True, known=fit.whites)
-            normal = self.normal(whites)
+            # until they are fitted, what the others' fit leaves of further recordings is their noise
+            as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
+            self._each(as_left, [n for n in self.recordings if n not in fit.carried])
+            self.settle(fit.models[0])
+            whites, normal = self._renewed()
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
             if not self._leave_out(search, normal):
@@ -499,25 +504,33 @@ class Bench:
 
         ``normal`` of a model fitted there saves the first step.
         """
+        ahead = np.inf  # log evidence that the last step promised
         if normal is not None:
             on = set(self.on)
-            if self.move(model, normal)[1] < self.settled:
+            ahead = self.move(model, normal)[1]
+            if ahead < self.settled:
                 return model
             if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
                 # a secant points the way only: its effect finds its place before anything undescribed takes it
                 kept = tuple(c for c in model.choices if self._kind(c.unit) not in ("form", "remainder"))
                 return self.settle(Model(kept, 0.0, 0.0, {}, {}))
         for _ in range(steps):
+            if ahead < FAR:
+                break
             # on its way a set may be led by a little bias, where it ends it must not
             found, at_point = self._fitted(model, corrected=False)
+            ahead = self.move(found, at_point)[1]
+        for _ in range(steps):
+            found, at_point = self._fitted(model)
             if self.move(found, at_point)[1] < self.settled:
                 break
-        found, at_point = self._fitted(model)
-        self.move(found, at_point)
         return found
 
     def inserted(self, model: Model, normal: Normal) -> Inserted:
         """A set at its own optimum, where the point is left as it was; ``normal`` of the present point."""
+        key = model.choices, tuple(sorted(self.point.items()))
+        if key in self._inserted:
+            return self._inserted[key]
         kept = dict(self.point), set(self.on), dict(self.sizes)
         found = self.settle(model, normal)
         values = self.values()
@@ -527,7 +540,9 @@ class Bench:
             if u in found.units
         }
         self.point, self.on, self.sizes = kept
-        return Inserted(values, {n: d for n, d in found.deviations.items() if not is_parameter(n)}, own)
+        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
+        self._inserted[key] = Inserted(values, beside, own)
+        return self._inserted[key]
 
     def _fitted(self, model: Model, corrected: bool = True) -> tuple[Model, Normal]:
         """A set fitted by the linear model of the present point, and that model; its members' widths stay."""
@@ -556,7 +571,7 @@ class Bench:
         if not members:
             return False
         begun = dict(self.point), set(self.on)
-        leading = self.settle(best)
+        leading = self.settle(best, normal)
         top = leading.log_posterior
         better = (dict(self.point), set(self.on)), False
         for unit in members:

@@ -31,7 +31,7 @@ class White:
     """A block made white and compressed: its columns' ``names`` and normal matrix ``gram``, the residual last.
 
     ``own`` is what a second draw of the noise changes the residual by, squared: the noise's part of the misfit;
-    ``count`` the number of rows used.
+    ``noise`` (column, column) what it changes the columns by, taken out of ``gram``; ``count`` the number of rows used.
     """
 
     recording: str
@@ -40,6 +40,7 @@ class White:
     gram: np.ndarray
     count: int
     own: float = 0.0
+    noise: np.ndarray | None = None
 
 
 def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.ndarray]]:
@@ -160,7 +161,10 @@ def correct(
     largest = np.where(np.array(changed) == last, np.inf, MOST_NOISE * power)
     rows *= np.sqrt(np.where(noise > largest, largest, 1.0) / np.where(noise > largest, noise, 1.0))
     misfit = white.gram[-1, -1]  # the same for all hypotheses
-    white.gram[np.ix_(changed, changed)] -= rows.T @ rows
+    taken = rows.T @ rows
+    white.gram[np.ix_(changed, changed)] -= taken
+    white.noise = np.zeros((last, last))
+    white.noise[np.ix_(changed[:-1], changed[:-1])] = taken[:-1, :-1]
     white.own = misfit - float(white.gram[-1, -1])
     white.gram[-1, -1] = misfit
     white.gram = _definite(white.gram)
@@ -186,6 +190,7 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         of.setdefault(aliases.get(n, n), []).append(index[n])
     size = len(names)
     H, g, c = np.zeros((size, size)), np.zeros(size), 0.0
+    noise = np.zeros((size, size))
     for w in whites:
         source, target = [], []
         for k, n in enumerate(w.names):
@@ -196,7 +201,29 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         H[np.ix_(into, into)] += w.gram[np.ix_(rows, rows)]
         g[into] += w.gram[rows, -1]
         c += w.gram[-1, -1] - w.own
-    return Normal(list(names), H, g, c)
+        if w.noise is not None:
+            noise[np.ix_(into, into)] += w.noise[np.ix_(rows, rows)]
+    return Normal(list(names), *_as_sure(H, g, noise), c)
+
+
+def _as_sure(H: np.ndarray, g: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal equations with the same solution, which say no more than noisy regressors do.
+
+    Corrected for the noise N in the columns, H a = -g has no bias, but the scatter of g is that of the columns as they
+    were, U = H + N. The covariance of a is H^-1 U H^-1 (the sandwich; White 1982, Econometrica 50, 1), and what says
+    just that is H U^-1 H in the place of H, with H U^-1 g in the place of g.
+    """
+    noisy = np.flatnonzero(np.diag(noise) > 0.0)
+    if not len(noisy):
+        return H, g
+    U = H + noise
+    U[np.diag_indices_from(U)] += np.where(np.diag(U) > 0.0, 0.0, 1.0)
+    solved = Definite(U).solve(np.column_stack([noise[:, noisy], g]))
+    inner = noise[noisy][:, noisy] - noise[noisy] @ solved[:, :-1]
+    H, g = H.copy(), g.copy()
+    H[np.ix_(noisy, noisy)] -= 0.5 * (inner + inner.T)
+    g[noisy] -= noise[noisy] @ solved[:, -1]
+    return H, g
 
 
 def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]) -> dict[str, float]:

@@ -1,9 +1,8 @@
 """The current that flows against the current that the controller asks for; gains and limits are the controller's own.
 
 Everything that the controller sees is recorded: command, output position, speed. Half the sum of the absolute phase
-currents, less half of what still flows in a phase that has been switched off, is the current of the pair that the
-comparator sees. Rows are means over ``BLOCK`` and differenced, which takes the
-random walk out that the integral makes of the sensors' noise.
+currents is the largest of them, and the pair's current but for what a commutation adds to it. Rows are means over
+``BLOCK`` and differenced, which takes the random walk out that the integral makes of the sensors' noise.
 """
 
 import numpy as np
@@ -54,7 +53,7 @@ def residual(state: State) -> Dual:
         late = late + m.delay(p.of(effect_name(m)))
     asked_for = asked_for - late * np.gradient(np.asarray(asked_for.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    pair = (rec.level - _fading(state)) * sign
+    pair = (rec.level - _beyond(state)) * sign
     width = block_length(rec)
     out = a.speed_gain * (_calmed(pair, h) / gain - asked_for)
     return out.linear(lambda x: _blocks(x, width), rec.size)
@@ -64,14 +63,16 @@ def _calmed(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(SPEED_SPAN / h), mode="nearest")
 
 
-def _fading(state: State) -> np.ndarray:
-    """(sample,) half the mean current of the phase that a commutation has switched off (A).
+def _beyond(state: State) -> np.ndarray:
+    """(sample,) what the largest phase current is above the reference while a current passes from phase to phase (A).
 
-    Its diode and the star point take a third of the supply's voltage from it, and two thirds of the back-EMF: a
-    current i is gone after 3 L i / (Vdc + 2 k w).
+    The diode of the phase that goes off and the star point take a third of the supply's voltage V from it, two thirds
+    of the back-EMF with it: a current i is gone after 3 L i / V. The comparator sees the mean of the new pair, which
+    starts at half of i, is driven to i in L i / V, and is held there while the third phase fades: the phase that
+    stays on carries i^2 L / (6 V) more up to then, i^2 L / (3 V) after, each integrated over time.
     """
     rec, a = state.rec, state.rec.actuator
-    charge = 0.75 * a.inductance * rec.level**2 / _supply(rec, np.sign(state.drive))
+    charge = 0.5 * a.inductance * rec.level**2 / _supply(rec, np.sign(state.drive))
     edges = np.zeros(rec.size)
     for j in range(3):
         low, high, _ = commutation.sweep(rec, j)

@@ -67,6 +67,10 @@ class Diagnosed:
         return next_recordings(self.bench, self.fit, self.leading, kept, self.values, effects, self.noise)
 
 
+ENOUGH = 150_000  # samples that a search begins with; what it leads to is fitted to all
+FEWEST = 5  # recordings that it begins with
+
+
 def diagnose(
     name: str,
     recordings: Mapping[str, Recording],
@@ -97,7 +101,12 @@ def diagnose(
     own = estimated_noise([recordings[n] for n in explore], noise)
     machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, exclude)
     bench = Bench(machine, list(explore), processes)
-    fit = bench.fit()
+    first = _spread(recordings, explore)
+    if len(first) < len(explore):
+        begun = Bench(machine, first, processes)
+        fit = bench.fit((begun, begun.fit()))
+    else:
+        fit = bench.fit()
     reading = read(fit.models, fit.search.units.values(), tuple(machine.observed()))
     sealed = _seal(reading)
     if not confirm:
@@ -111,10 +120,24 @@ def diagnose(
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
     ladder = Ladder(every, confirm)
     named = read(all_fit.models, units, observed).named
-    models, ratios = held_to_account(all_fit.models, named, ladder, bench, fit)
+    models, ratios = held_to_account(all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
     final = read(models, units, observed)
     return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios), recordings, own)
+
+
+def _spread(recordings: Mapping[str, Recording], names: Sequence[str]) -> list[str]:
+    """As many of the recordings as a search needs to begin with, spread over temperatures, commands and health."""
+    order = sorted(
+        names,
+        key=lambda n: (
+            recordings[n].ambient_temperature, recordings[n].attributes.get("health"),
+            str(recordings[n].attributes.get("command")), n,
+        ),
+    )  # fmt: skip
+    samples = sum(len(recordings[n].time) for n in names)
+    count = min(len(order), max(FEWEST, int(len(order) * ENOUGH / samples)))
+    return sorted({order[k] for k in np.linspace(0, len(order) - 1, count).round().astype(int)})
 
 
 def _seal(reading: Reading) -> dict[str, Any]:

@@ -51,7 +51,7 @@ class MeasuredBench(Bench):
     reaches = (np.inf, np.inf)  # priors are as wide as the signals allow
     settled = SETTLED
 
-    def linearise(self, model=None, renew=False, known=(), corrected=True):
+    def linearise(self, model=None, renew=False, corrected=True):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
         columns, aliases = self._columns_of(model)
         wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))

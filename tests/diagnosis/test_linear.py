@@ -1,0 +1,32 @@
+"""Noise in the regressors: an estimate without bias that says no more than the data do."""
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.linear import White, assemble
+
+ROWS, DRAWS, NOISE = 400, 300, 1.5
+
+
+def corrected(rng, truth):
+    """Normal equations of y = -truth x + e, where x is known with noise of its own, which is taken out on average."""
+    x = rng.standard_normal(ROWS)
+    known = x + NOISE * rng.standard_normal(ROWS)
+    left = truth * x + rng.standard_normal(ROWS)
+    both = np.column_stack([known, left])
+    gram = both.T @ both
+    taken = np.array([[ROWS * NOISE**2]])
+    gram[0, 0] -= taken[0, 0]
+    return assemble([White("one", "torque", ["a"], gram, ROWS, noise=taken)], ["a"], {})
+
+
+def test_what_noisy_regressors_say_of_nothing_is_chi_square():
+    rng = np.random.default_rng(3)
+    gains = [float(n.g[0] ** 2 / n.H[0, 0]) for n in (corrected(rng, 0.0) for _ in range(DRAWS))]
+    assert np.mean(gains) == pytest.approx(1.0, abs=0.25)  # without the sandwich: 1 + NOISE^2
+
+
+def test_the_estimate_has_no_bias():
+    rng = np.random.default_rng(4)
+    found = [-float(n.g[0] / n.H[0, 0]) for n in (corrected(rng, -0.5) for _ in range(DRAWS))]
+    assert np.mean(found) == pytest.approx(0.5, abs=0.03)
