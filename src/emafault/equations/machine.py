@@ -306,8 +306,8 @@ class ReferenceActuator:
         if equation.startswith("electrical"):
             j = "abc".index(equation[-1])
             drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * 0.02]
-        elif equation == "torque":
-            drivers += [rec.direction]
+        elif equation == "torque":  # friction, torque constant, inertia
+            drivers += [rec.direction, _over_rms(state.drive), _over_rms(rec.acceleration)]
         elif equation == "sensor_speed":
             drivers += [w]
         elif equation == "sensor_current":
@@ -339,6 +339,10 @@ class ReferenceActuator:
             "drivers": np.array(rows),
             **kinds,
         }
+
+
+def _over_rms(x: np.ndarray) -> np.ndarray:
+    return x / max(float(np.sqrt(np.mean(x**2))), 1e-12)
 
 
 def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
