@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from .evidence import Definite, Reduced
-from .fit import Bench, Inserted, is_parameter
+from .fit import Bench, Inserted
 from .linear import White, assemble, compressed, white_rows
 from .linearisation import SETTINGS
 from .model import Block
+from .point import is_parameter
 
 STEPS = 1  # of a refit of what belongs to a recording alone
 PLACEBOS = 20

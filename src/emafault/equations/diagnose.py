@@ -12,9 +12,10 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
 from ..diagnosis.evidence import Definite
-from ..diagnosis.fit import NOTHING, Bench, Fit, is_parameter
+from ..diagnosis.fit import NOTHING, Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import Reading, read
+from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
 from ..effects import EFFECTS

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
-from ..diagnosis.fit import Bench, Fit, is_parameter
+from ..diagnosis.fit import Bench, Fit
+from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..effects import EFFECTS
 

@@ -151,6 +151,10 @@ class Recorded:
         for key in sorted({k for r in every for k in _places(r)} - set(places)):
             places[key] = len(places)
 
+    def families(self, equation: str) -> tuple:
+        """A remainder goes along all coordinates together: few rows tell them apart."""
+        return ()
+
     def functions(self, rows: Rows) -> np.ndarray:
         """(function, row): a constant, smooth and faster functions of the coordinates, one for each place."""
         found = [np.ones(rows.size)]

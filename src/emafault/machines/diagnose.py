@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import Any
 
 from ..diagnosis.evidence import Reduced
-from ..diagnosis.fit import NOTHING, Fit, is_parameter
+from ..diagnosis.fit import NOTHING, Fit
 from ..diagnosis.naming import Reading, read
+from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Choice, Model
 from . import held_out, verdict
 from .adapter import Recorded

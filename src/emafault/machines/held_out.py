@@ -7,8 +7,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..diagnosis.closure import closed, placebo, rms, rows
-from ..diagnosis.fit import is_parameter
 from ..diagnosis.linear import White, assemble, own_columns, remainder_columns
+from ..diagnosis.point import is_parameter
 from .adapter import Recorded
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..diagnosis.fit import is_parameter
+from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
 from .held_out import whitened, with_functions

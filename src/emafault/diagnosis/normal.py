@@ -1,0 +1,250 @@
+"""Normal equations of a bench at its point: linearised, assembled, and the step that a set would take."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .evidence import Definite, Normal, Reduced, marginalise
+from .forked import Workers
+from .linear import OWN_FORM, White, assemble, full_model, white_rows
+from .linearisation import Carried, Linearisation, Task
+from .model import Parameter, Unit, Variant
+from .point import Point, is_parameter
+from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
+
+OWN_SHARES = (1.0, 0.2)  # of the largest own form: as far from the library's as a form is, or near it
+
+
+class NormalEquations(Point):
+    """Recordings of one machine under one linearised model.
+
+    Parameters
+    ----------
+    machine : gives ``parameters``, ``units``, ``blocks(values, recordings)`` and ``families(equation)``: sets of (driver,
+        function) of its remainder that go along one coordinate
+    recordings : names of those that are fitted
+    processes : in which recordings are linearised side by side
+    """
+
+    def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
+        super().__init__(machine, recordings)
+        self.processes = processes
+        self.carried: dict[str, Carried] = {}
+        self.workers: Workers | None = None
+        self.remainders: dict[str, Unit] = {}
+        self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
+
+    def linearise(self, model: Model | None = None, renew: bool = False, corrected: bool = True) -> list[White]:
+        """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
+
+        ``renew`` takes the weights from what a full model leaves there.
+        ``corrected`` takes out what the noise in the regressors adds.
+        """
+        columns, aliases = self._columns_of(model)
+        wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
+        left = None
+        if model is not None:
+            left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
+        task = Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
+        if not renew:
+            return self._each(task, self.recordings)
+        whites = self._each(replace(task, again=True, corrected=False), self.recordings)
+        full = full_model(whites, self._full_prior(columns, aliases))
+        return self._each(replace(task, full=full), self.recordings)
+
+    def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
+        """Columns of units, all or those of a model, and aliases."""
+        columns, aliases = self.columns()
+        if model is not None:
+            inside = {n for c in model.choices for n in self.names_of(c)}
+            columns = [n for n in columns if n in inside]
+        return columns, aliases
+
+    def _full_prior(self, columns: Sequence[str], aliases: Mapping[str, str]) -> dict[str, tuple[float, float]]:
+        """Mean and standard deviation of deviations with everything free, an alias's width added to its quantity's."""
+        out = {n: self.prior(n)[:2] for n in self.nuisances}
+        for n in columns:
+            sd = self.prior(n)[1]
+            own = aliases.get(n, n)
+            before = out.get(own, (0.0, 0.0))
+            # in the full model an effect has the prior's width around where it is
+            out[own] = (before[0], float(np.hypot(before[1], sd)))
+        return out
+
+    def _each(self, task: Task, names: Sequence[str]) -> list[White]:
+        """A task done for recordings, side by side where there are processes; takes over what they carry."""
+        if self.workers is None:
+            several = min(self.processes, len(self.recordings))
+            for name in self.recordings if several > 1 else ():
+                self.machine.prepare(name)
+            self.workers = Workers(self, Linearisation(self.machine), several)
+        found = self.workers.map("compress", [(task, n, self.carried.get(n, {})) for n in names])
+        self.carried |= {n: carried for n, (_, carried) in zip(names, found, strict=True)}
+        return [w for whites, _ in found for w in whites]
+
+    def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
+        """Equation, (row,) what deviations add to each block in units of its noise, and what its rows lie along."""
+        _, aliases = self.columns()
+        wanted = list(dict.fromkeys(aliases.get(n, n) for n in deviations if is_parameter(n)))
+        out = []
+        for name in self.recordings:
+            for block in self.machine.blocks(self.values(), name, wanted=set(wanted)):
+                names, rows = white_rows(block, wanted, any(n.startswith("remainder.") for n in deviations))
+                d = np.array([deviations.get(n, 0.0) for n in names])
+                out.append((block.equation, rows[:, :-1] @ d, block.coordinates))
+        return out
+
+    def _amounts(self, model: Model | None) -> dict[str, dict[str, float]]:
+        """Sizes from off, by column, of the units that carry their own form."""
+        out = {}
+        for unit in self.units:
+            if unit.id not in self.sizes or (model is not None and unit.id not in model.units):
+                continue
+            sizes = self.sizes[unit.id]
+            if unit.id in self.on:  # of what the point holds: an effect of no size has no form
+                here = self.active(unit)[0].parameters if unit.on is not None else unit.parameters
+                sizes = self.sizes[unit.id] = {p.name: -self.prior(p.name)[2] for p in here}
+            out[unit.id] = {self.parameters[n].alias or n: d for n, d in sizes.items()}
+        return out
+
+    def normal(self, whites: Sequence[White], model: Model | None = None) -> Normal:
+        """Normal matrix of all columns, or of those that a model has, remainders among them."""
+        columns, aliases = self._columns_of(model)
+        left = list(dict.fromkeys(n for w in whites for n in w.names if not is_parameter(n)))
+        return assemble(whites, [*self.nuisances, *columns, *left], aliases)
+
+    def reduce(self, normal: Normal) -> Reduced:
+        """The nuisances marginalised."""
+        prior = {n: self.prior(n) for n in normal.names}
+        mean = np.array([prior[n][0] for n in self.nuisances])
+        sd = np.array([prior[n][1] for n in self.nuisances])
+        fixed = np.array([prior[n][2] for n in normal.names])
+        return marginalise(normal, self.nuisances, mean, sd, fixed)
+
+    def nuisance_deviations(self, normal: Normal, given: dict[str, float]) -> dict[str, float]:
+        """Deviations of the nuisances where other columns take those given, the rest off."""
+        index = normal.index
+        n = np.array([index[x] for x in self.nuisances])
+        rest = [x for x in normal.names if x not in set(self.nuisances)]
+        d = np.array([given.get(x, self.prior(x)[2]) for x in rest])
+        r = np.array([index[x] for x in rest], int)
+        mean = np.array([self.prior(x)[0] for x in self.nuisances])
+        sd = np.array([self.prior(x)[1] for x in self.nuisances])
+        A = normal.H[np.ix_(n, n)] + np.diag(1.0 / sd**2)
+        right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
+        found = Definite(A).solve(right)
+        return dict(zip(self.nuisances, found.tolist(), strict=True))
+
+    # ---- candidates
+    def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
+        """Units and remainders of the present point, ready for the search."""
+        out: dict[tuple[str, int], Candidate] = {}
+        owns: dict[str, list[int]] = {}
+        for k, n in enumerate(reduced.names):
+            if n.startswith("own."):
+                owns.setdefault(n.split(".")[1], []).append(k)
+        for unit in self.units:
+            own = np.array(owns.get(unit.id, ()), int)
+            for v, variant in enumerate(self.active(unit)):
+                names = [p.name for p in variant.parameters]
+                if not all(n in reduced.index for n in names):
+                    continue
+                index = np.array([reduced.index[n] for n in names])
+                prior = [self.prior(n) for n in names]
+                signs = np.array(list(variant.signs) or [0] * len(names))
+                switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
+                plain = Candidate(
+                    index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
+                    (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
+                    np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
+                )  # fmt: skip
+                out[unit.id, v] = plain
+                for k, (share, inside) in enumerate(self._own_kinds(reduced, own), start=1):
+                    own_sd = np.full(len(inside), share * OWN_FORM)
+                    out[unit.id, v + k * OTHER_FORM] = replace(plain, extra=inside, extra_sd=own_sd)
+        left: dict[str, tuple[list[int], list[int]]] = {}
+        for k, n in enumerate(reduced.names):
+            if n.startswith("remainder."):
+                left.setdefault(n.split(".")[1], ([], []))["@" in n].append(k)
+        for equation, kinds in left.items():
+            # the same in all recordings, or another in each
+            each = [np.array(k) for k in kinds if k]
+            if kinds[0]:
+                where = {k: reduced.names[k].split(".")[2:] for k in kinds[0]}
+                for family in self.machine.families(equation):
+                    each.append(np.array([k for k, (d, f) in where.items() if (int(d), int(f)) in family]))
+            unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])] * len(each))
+            self.remainders.setdefault(unit.id, unit)
+            for v, index in enumerate(each):
+                out[unit.id, v] = Candidate(
+                    index, np.zeros(len(index)), np.ones(len(index)), np.zeros(len(index), int), REMAINDER_SIZES,
+                    [reduced.names[k] for k in index],
+                )  # fmt: skip
+        return [*self.units, *self.remainders.values()], out
+
+    def _own_kinds(self, reduced: Reduced, own: np.ndarray) -> list[tuple[float, np.ndarray]]:
+        """Share of the largest own form and columns of each kind of own form: along every coordinate, or along one."""
+        if not len(own):
+            return []
+        every = [own]
+        where = {k: reduced.names[k].split(".")[2:] for k in own.tolist()}
+        of = {e: self.machine.families(e) for e in dict.fromkeys(e for e, _ in where.values())}
+        if all(of.values()):
+            every.append(np.array([k for k, (_, f) in where.items() if f == "0"], int))  # by equation
+            for n in range(min(map(len, of.values()))):
+                every.append(np.array([k for k, (e, f) in where.items() if (0, int(f)) in of[e][n]], int))
+        return [(share, inside) for inside in every for share in OWN_SHARES]
+
+    def _tolerance(self, p: Parameter) -> float:
+        """Tolerance of the quantity that a parameter is beyond, as a share of the parameter's prior."""
+        return self.parameters[p.alias].sd / p.sd if p.alias is not None else 0.0
+
+    # ---- a step
+    def move(self, model: Model, normal: Normal) -> tuple[float, float]:
+        """Move the point to a model's fit.
+
+        Returns
+        -------
+        largest step in prior standard deviations, and the log evidence that the step promises (Newton decrement;
+        Boyd and Vandenberghe 2004, Convex Optimization, section 9.5.1)
+        """
+        given = {n: d for n, d in model.deviations.items()}
+        nuisance = self.nuisance_deviations(normal, given)
+        largest = max((abs(d) / self.prior(n)[1] for n, d in nuisance.items()), default=0.0)
+        inside = {c.unit: c for c in model.choices}
+        on: set[str] = set()
+        moved = dict(nuisance)
+        switched: list[tuple[Unit, Parameter, float]] = []
+        for unit in self.units:
+            if unit.id not in inside:
+                continue
+            for p in self.active(unit)[inside[unit.id].variant % OTHER_FORM].parameters:
+                d = given.get(p.name, 0.0)
+                if p.secant is not None:
+                    switched.append((unit, p, d))
+                    largest = 1.0
+                else:
+                    largest = max(largest, abs(d) / p.sd)
+                    if unit.on is not None and unit.id in self.on and len(unit.variants) > 1:
+                        d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
+                    moved[p.name] = d
+            on.add(unit.id)
+        moved = {n: self._within_reach(n, d) for n, d in moved.items()}
+        decrement = np.inf if switched else self._decrement(moved, normal)
+        found = self.after(moved)
+        for unit in self.units:
+            if unit.id not in inside:
+                found |= {p.name: p.off for p in unit.parameters}
+        self.point |= found
+        for unit, p, d in switched:
+            self._switch_on(unit, p, d)
+        self.on = on
+        return largest, decrement
+
+    def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
+        names = [n for n in moved if n in normal.index]
+        k = np.array([normal.index[n] for n in names], int)
+        d = np.array([moved[n] for n in names])
+        sd = np.array([self.prior(n)[1] for n in names])
+        return float(0.5 * (d @ normal.H[np.ix_(k, k)] @ d + np.sum((d / sd) ** 2)))

@@ -1,0 +1,135 @@
+"""The point at which a bench is linearised: parameters with their priors there, and the units that act."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .linear import OWN_FORM
+from .model import Parameter, Unit, Variant
+from .search import OTHER_FORM, Choice
+
+REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
+
+
+def is_parameter(column: str) -> bool:
+    """Whether a column is a parameter's, and not a function of a remainder or of an effect's own form."""
+    return not column.startswith(("remainder.", "own."))
+
+
+class Point:
+    """Where the parameters of some recordings of a machine are, and which units act there."""
+
+    reaches = REACH
+
+    def __init__(self, machine, recordings: Sequence[str]):
+        self.machine, self.recordings = machine, list(recordings)
+        self.parameters: dict[str, Parameter] = dict(machine.parameters)
+        self.units: list[Unit] = list(machine.units)
+        self.point = {n: p.off for n, p in self.parameters.items()}
+        self.on: set[str] = set()
+        self.reach = self.reaches[1]
+        of_unit = {p.name for u in self.units for p in u.parameters}
+        mine = set(self.recordings)
+        self.nuisances = [
+            n
+            for n, p in self.parameters.items()
+            if n not in of_unit and not p.fixed and p.sd > 0.0 and ("@" not in n or n.split("@", 1)[1] in mine)
+        ]
+        self._beyond: dict[str, list[str]] = {}
+        for n, p in self.parameters.items():
+            if p.alias is not None:
+                self._beyond.setdefault(p.alias, []).append(n)
+
+    def active(self, unit: Unit) -> list[Variant]:
+        """Variants of a unit at the present point."""
+        if unit.on is not None and unit.id in self.on:
+            return [unit.on]
+        return list(unit.variants)
+
+    def columns(self) -> tuple[list[str], dict[str, str]]:
+        """Names of all columns of units at the present point, and aliases."""
+        names, aliases = [], {}
+        for unit in self.units:
+            for v in self.active(unit):
+                for p in v.parameters:
+                    names.append(p.name)
+                    if p.alias is not None:
+                        aliases[p.name] = p.alias
+        return names, aliases
+
+    def names_of(self, choice: Choice) -> list[str]:
+        """Columns of a unit's variant at the present point."""
+        if choice.unit.startswith("remainder:"):
+            return []
+        unit = next(u for u in self.units if u.id == choice.unit)
+        return [p.name for p in self.active(unit)[choice.variant % OTHER_FORM].parameters]
+
+    def _kind(self, unit: str) -> str:
+        return next((u.kind for u in self.units if u.id == unit), "remainder")
+
+    def values(self) -> dict[str, float]:
+        """The point as the machine takes it: what lies beyond a tolerance added to its quantity."""
+        out = dict(self.point)
+        for n, p in self.parameters.items():
+            if p.alias is not None:
+                out[p.alias] = out.get(p.alias, self.parameters[p.alias].off) + self.point.get(n, 0.0)
+        return out
+
+    def prior(self, name: str) -> tuple[float, float, float]:
+        """Deviation of the prior's mean from the point, its standard deviation, and the deviation that is off."""
+        if not is_parameter(name):
+            return 0.0, OWN_FORM if name.startswith("own.") else 1.0, 0.0
+        p = self.parameters[name]
+        at = self.point.get(name, p.off)
+        if p.vanishes is None:
+            return p.mean - at, p.sd, p.off - at
+        u, factor = self._factor(name)
+        if p.alias is not None:  # beyond its tolerance: a factor on its quantity's own
+            own = u / factor
+            return -u * np.log(factor), p.sd * u / own, -u * np.log(factor)
+        mean, off = p.mean - p.vanishes, p.off - p.vanishes
+        return u * np.log(mean / factor), p.sd * abs(u / mean), u * np.log(off / factor)
+
+    def _factor(self, name: str) -> tuple[float, float]:
+        """What a parameter that multiplies makes with its alias, the unit of its deviations, and its own factor."""
+        p = self.parameters[name]
+        assert p.vanishes is not None
+        own = p.alias or name
+        base = self.point.get(own, self.parameters[own].off) - p.vanishes
+        beyond = sum(self.point.get(n, 0.0) for n in self._beyond.get(own, ()))
+        if p.alias is None:
+            return base + beyond, base
+        return base + beyond, (base + beyond) / base
+
+    def after(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Values of parameters after deviations from the point."""
+        out: dict[str, float] = {}
+        for n, d in given.items():
+            if not is_parameter(n):
+                continue
+            p = self.parameters[n]
+            if p.vanishes is None:
+                out[n] = self.point.get(n, p.off) + d
+            elif p.alias is None:
+                u, factor = self._factor(n)
+                out[n] = p.vanishes + factor * float(np.exp(np.clip(d / u, -1.0, 1.0)))
+            else:
+                u, factor = self._factor(n)
+                own = out.get(p.alias, p.vanishes + u / factor)
+                out[n] = (own - p.vanishes) * (factor * float(np.exp(np.clip(d / u, -1.0, 1.0))) - 1.0)
+        return out
+
+    def _within_reach(self, name: str, deviation: float) -> float:
+        """A deviation no further than the prior has any mass: a model that lacks the cause asks for more."""
+        mean, sd, _ = self.prior(name)
+        return float(np.clip(deviation, mean - self.reach * sd, mean + self.reach * sd))
+
+    def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:
+        """An effect found along a secant gets parameters of its own."""
+        assert unit.on is not None and p.secant is not None
+        amount = float(np.clip(amount, 0.2, 5.0))
+        first = True
+        for own in unit.on.parameters:
+            at = p.secant.get(own.name, own.mean)
+            self.point[own.name] = own.off + (at - own.off) * amount if first else at
+            first = False
