@@ -21,8 +21,8 @@ class NormalEquations(Point):
 
     Parameters
     ----------
-    machine : gives ``parameters``, ``units``, ``blocks(values, recordings)`` and ``families(equation)``: sets of (driver,
-        function) of its remainder that go along one coordinate
+    machine : gives ``parameters``, ``units``, ``blocks(values, recordings)`` and ``families(equation)``: sets of
+        (driver, function) of its remainder that go along one coordinate
     recordings : names of those that are fitted
     processes : in which recordings are linearised side by side
     """
