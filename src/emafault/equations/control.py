@@ -51,11 +51,12 @@ def residual(state: State) -> Dual:
     late: Dual | float = p(f"controller.timing@{rec.name}")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
-    asked_for = asked_for - late * np.gradient(np.asarray(asked_for.value), h)
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    pair = (rec.level - _beyond(state)) * sign
+    flowing = _calmed((rec.level - _beyond(state)) * sign, h) / gain
+    # the current changes as the demand does, and is known with less noise
+    asked_for = asked_for - late * np.gradient(np.asarray(value_of(flowing)), h)
     width = block_length(rec)
-    out = a.speed_gain * (_calmed(pair, h) / gain - asked_for)
+    out = a.speed_gain * (flowing - asked_for)
     return out.linear(lambda x: _blocks(x, width), rec.size)
 
 
