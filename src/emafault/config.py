@@ -358,6 +358,11 @@ def _of_rung(value: Any, rung: str) -> int:
     return value[rung] if isinstance(value, dict) else value
 
 
+def withheld_shows_measured(draw: str) -> bool:
+    """Whether a draw's scoreboard shows the measured recordings too."""
+    return bool(_withheld_draw(draw).get("measured", True))
+
+
 def withheld_jobs(draw: str) -> list[tuple[str, int]]:
     """(rung, batch) of every job of a draw; T3 is made by the jobs of T1, whose benches it diagnoses."""
     read = _withheld_draw(draw)

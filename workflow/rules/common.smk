@@ -191,6 +191,11 @@ def bench_files(wildcards):
         sys.exit(f"emafault: {error}")
 
 
+def withheld_measured(wildcards):
+    """Rows of the measured recordings, of a draw that shows them."""
+    return rules.diagnose_machines.output.withheld if configuration.withheld_shows_measured(wildcards.draw) else []
+
+
 def withheld_batches(wildcards):
     """Files of every job of a draw."""
     return [f"{WITHHELD}/{wildcards.draw}/{rung}_{n}.json" for rung, n in configuration.withheld_jobs(wildcards.draw)]

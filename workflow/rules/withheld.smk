@@ -25,7 +25,7 @@ rule diagnose_cases:
 rule score_cases:
     input:
         batches=withheld_batches,
-        measured=rules.diagnose_machines.output.withheld,
+        measured=withheld_measured,
         where=rules.prepare_tracking.output,
     output:
         report=f"{WITHHELD}/{{draw}}/scoreboard.html",

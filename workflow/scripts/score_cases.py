@@ -8,5 +8,5 @@ from emafault.study.scored import score_draw
 with one_line_errors(snakemake.log[0]):
     files = [Path(path) for path in snakemake.input.batches]
     given, out = snakemake.input, snakemake.output
-    places = Path(given.measured), Path(out.report), Path(out.scores)
+    places = Path(given.measured) if given.measured else None, Path(out.report), Path(out.scores)
     score_draw(files, *places, given.where[0], snakemake.threads)

@@ -10,14 +10,14 @@ from ..withheld.scoring import score
 
 
 def score_draw(
-    batches: Sequence[Path], measured: Path, report: Path, scores: Path, where: str, processes: int = 1
+    batches: Sequence[Path], measured: Path | None, report: Path, scores: Path, where: str, processes: int = 1
 ) -> None:
     """Score the cases of a draw: page, figures and ``scores.json`` beside ``report``, and one MLflow run.
 
     Parameters
     ----------
     batches : what the jobs of the draw have written
-    measured : rows of the check by known changes of measured recordings, the rung T6
+    measured : rows of the check by known changes of measured recordings, the rung T6, where the draw shows them
     where : what ``prepare_tracking`` has written
     processes : over so many the cases are shared out
 
@@ -26,7 +26,7 @@ def score_draw(
     InputError : a verdict that cannot be read, or a tracking server that cannot be used
     """
     folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    found = score(folder, processes=processes) | {"measured": json.loads(measured.read_text())}
+    found = score(folder, processes=processes) | {"measured": json.loads(measured.read_text()) if measured else []}
     page = write_scoreboard(found, report.parent)
     if page != report:
         page.replace(report)
