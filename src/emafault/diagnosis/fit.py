@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import Normal, Reduced
+from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
 from .model import LISTED
@@ -34,7 +34,6 @@ class Fit:
     whites: list[White]
     carried: dict[str, Carried]  # by recording
     models: list[Model]
-    reduced: Reduced
     normal: Normal
     search: Search
 
@@ -95,7 +94,7 @@ class Bench(NormalEquations):
                 break
             whites, normal = self._renewed()
             whites, normal, search = self._until_still(whites, normal, ROUNDS)
-        return Fit(dict(self.point), whites, self.carried, search.ranked(), search.reduced, normal, search)
+        return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
 
     def _renewed(self) -> tuple[list[White], Normal]:
         whites = self.linearise(renew=True)

@@ -22,7 +22,7 @@ class NormalEquations(Point):
     Parameters
     ----------
     machine : gives ``parameters``, ``units``, ``blocks(values, recordings)`` and ``families(equation)``: sets of
-        (driver, function) of its remainder that go along one coordinate
+        functions of its remainder that go along one coordinate
     recordings : names of those that are fitted
     processes : in which recordings are linearised side by side
     """
@@ -41,17 +41,21 @@ class NormalEquations(Point):
         ``renew`` takes the weights from what a full model leaves there.
         ``corrected`` takes out what the noise in the regressors adds.
         """
+        task = self._task(model, corrected)
+        if not renew:
+            return self._each(task, self.recordings)
+        whites = self._each(replace(task, again=True, corrected=False), self.recordings)
+        full = full_model(whites, self._full_prior(*self._columns_of(model)))
+        return self._each(replace(task, full=full), self.recordings)
+
+    def _task(self, model: Model | None, corrected: bool) -> Task:
+        """What is to be linearised at the present point: every column and remainder, or those that a model has."""
         columns, aliases = self._columns_of(model)
         wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
         left = None
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        task = Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
-        if not renew:
-            return self._each(task, self.recordings)
-        whites = self._each(replace(task, again=True, corrected=False), self.recordings)
-        full = full_model(whites, self._full_prior(columns, aliases))
-        return self._each(replace(task, full=full), self.recordings)
+        return Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""
@@ -173,7 +177,7 @@ class NormalEquations(Point):
             if kinds[0]:
                 where = {k: reduced.names[k].split(".")[2:] for k in kinds[0]}
                 for family in self.machine.families(equation):
-                    each.append(np.array([k for k, (d, f) in where.items() if (int(d), int(f)) in family]))
+                    each.append(np.array([k for k, (d, f) in where.items() if d == "0" and int(f) in family]))
             unit = Unit(f"remainder:{equation}", "remainder", (equation,), [Variant([])] * len(each))
             self.remainders.setdefault(unit.id, unit)
             for v, index in enumerate(each):
@@ -193,7 +197,7 @@ class NormalEquations(Point):
         if all(of.values()):
             every.append(np.array([k for k, (_, f) in where.items() if f == "0"], int))  # by equation
             for n in range(min(map(len, of.values()))):
-                every.append(np.array([k for k, (e, f) in where.items() if (0, int(f)) in of[e][n]], int))
+                every.append(np.array([k for k, (e, f) in where.items() if int(f) in of[e][n]], int))
         return [(share, inside) for inside in every for share in OWN_SHARES]
 
     def _tolerance(self, p: Parameter) -> float:

@@ -60,11 +60,9 @@ class ReferenceActuator:
                 if full not in self.parameters and effect.id not in self.effects:
                     self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
 
-    def families(self, equation: str) -> tuple[frozenset[tuple[int, int]], ...]:
-        """Functions of a remainder or an own form that go along one coordinate: (driver, function) each."""
-        if equation in SETTINGS:
-            return ()
-        return tuple(frozenset((d, f) for f in along for d in range(1)) for along in ALONG)
+    def families(self, equation: str) -> tuple[tuple[int, ...], ...]:
+        """Functions of a remainder or an own form that go along one coordinate; none of the controller's equations."""
+        return () if equation in SETTINGS else ALONG
 
     # ---- parameters
     def _nuisances(self) -> dict[str, Parameter]:

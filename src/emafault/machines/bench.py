@@ -6,7 +6,6 @@ import numpy as np
 
 from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import NOTHING, Bench, Fit
-from ..diagnosis.linearisation import Task
 from ..diagnosis.model import Unit, Variant
 from ..diagnosis.search import Candidate, Model, Search
 from .adapter import SMOOTH, WAVES
@@ -53,13 +52,7 @@ class MeasuredBench(Bench):
 
     def linearise(self, model=None, renew=False, corrected=True):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
-        columns, aliases = self._columns_of(model)
-        wanted = tuple(dict.fromkeys([*self.nuisances, *[aliases.get(n, n) for n in columns]]))
-        left = None
-        if model is not None:
-            left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        task = Task(self.values(), wanted, left, self._amounts(model), corrected=False)
-        return self._each(task, self.recordings)
+        return self._each(self._task(model, corrected=False), self.recordings)
 
     def fit(self, begun=None):
         """See ``Bench``; the base model stands still before anything is compared, and rivals are compared at their own
@@ -72,7 +65,7 @@ class MeasuredBench(Bench):
             search = self._search(normal)
             if not self._to_the_best(search):
                 break
-        return Fit(dict(self.point), whites, self.carried, search.ranked(), search.reduced, normal, search)
+        return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
 
     def _to_the_best(self, search: Search) -> bool:
         """Move to the finalist that is the most probable at its own optimum; whether it is not the leading one."""
