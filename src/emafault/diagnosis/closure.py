@@ -41,11 +41,14 @@ class Ladder:
         remainders and own forms of a fitted set out of what is left.
         """
         out: list[White] = []
+        of_each = {n.rsplit("@", 1)[0] for n in also if "@" in n}
         shaped = {n for amounts in (inserted.own.values() if inserted else ()) for n in amounts}
         for recording in self.recordings:
+            own = f"@{recording}"
             free = [
                 n for n in self.parameters
-                if n.endswith(f"@{recording}") and not n.startswith("controller.") and n in self.nuisances | set(also)
+                if n.endswith(own) and not n.startswith("controller.")
+                and (n in self.nuisances or n.removesuffix(own) in of_each)
             ]  # fmt: skip
             mine, weights = {n: p.off for n, p in self.parameters.items()} | dict(values), self.carried[recording]
             for step in range(STEPS + 1):

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .described import Described, WithForms, proposed, refined
 from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
-from .model import LISTED
+from .model import LISTED, Block
 from .normal import NormalEquations
 from .point import is_parameter
 from .search import OTHER_FORM, Model, Search
@@ -17,6 +18,7 @@ ROUNDS = 3
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
+SINGLES = 5  # listed effects that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
 STILL = 0.3  # prior standard deviations by which the point may still move
 FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
@@ -55,6 +57,7 @@ class Bench(NormalEquations):
     """A bench with the search over its sets."""
 
     searching: type[Search] = Search
+    describing = True  # whether what is left is looked through for forms
     settled = SETTLED
 
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
@@ -73,13 +76,19 @@ class Bench(NormalEquations):
             self.reach = self.reaches[0]
             self.settle(NOTHING)
             whites, normal = self._renewed()
+            if self._describe("first"):
+                whites, normal = self._renewed()
             self.reach = self.reaches[1]
+            if self._begun_at_single(normal):
+                whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, normal, FIRST, False)
-            if self._carry_own_forms(search):
+            more = self._describe("led")
+            if self._carry_own_forms(search) or more:
                 whites, normal = self._renewed()
         else:
             bench, fit = begun
+            self.describe(bench.described)
             self.point |= {n: v for n, v in fit.values.items() if n in self.point}
             self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
             self.carried |= fit.carried
@@ -96,6 +105,71 @@ class Bench(NormalEquations):
             whites, normal, search = self._until_still(whites, normal, ROUNDS)
         return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
 
+    @property
+    def described(self) -> tuple[Described, ...]:
+        """Forms that have been proposed."""
+        return getattr(self.machine, "forms", ())
+
+    def describe(self, forms: Sequence[Described]) -> None:
+        """Take described forms among the candidate causes."""
+        if tuple(forms) == self.described:
+            return
+        self.machine = WithForms(getattr(self.machine, "machine", self.machine), forms)
+        self.parameters = dict(self.machine.parameters)
+        self.units = list(self.machine.units)
+        self.point = {n: p.off for n, p in self.parameters.items()} | self.point
+        self.workers = None  # another machine is theirs from the fork on
+
+    def _describe(self, mark: str) -> bool:
+        """Look through what the present point leaves for forms; whether there are any."""
+        found = proposed(self.machine, self._left(), self.carried, mark) if self.describing else []
+        found = [f for f in found if not any(f.same(g) for g in self.described)]
+        self.describe([*self.described, *found])
+        return bool(found)
+
+    def _left(self) -> list[Block]:
+        return [b for n in self.recordings for b in self.machine.blocks(self.values(), n, wanted=())]
+
+    def _refine(self, model: Model) -> bool:
+        """Give described forms of a set, fitted at the present point, the shape that is best there; whether any
+        changes."""
+        mine = [f for f in self.described if f.id in model.units]
+        if not mine:
+            return False
+        blocks = self._left()
+        better = {f.id: refined(f, blocks, self.carried, self.point) for f in mine}
+        before = self.described
+        self.describe([better.get(f.id, f) for f in before])
+        return self.described != before
+
+    def _begun_at_single(self, normal: Normal) -> bool:
+        """Move the point to the best single listed effect where that, at its own optimum, is better than what the
+        linear model has lead; whether it is.
+
+        A far optimum looks from here like several small effects together.
+        """
+        search = self._search(normal, remainders=False)
+        leading = search.ranked()[0]
+        if len(leading.units) < 2:
+            return False
+        best: dict[str, Model] = {}  # variant of each effect
+        for m in search.candidates:
+            if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM:
+                single = search.fit((m,))
+                if m[0] not in best or single.log_posterior > best[m[0]].log_posterior:
+                    best[m[0]] = single
+        singles = sorted(best.values(), key=lambda m: -m.log_posterior)[:SINGLES]
+        begun = dict(self.point), set(self.on)
+        ends = []
+        for model in [leading, *singles]:
+            self.point, self.on = dict(begun[0]), set(begun[1])
+            found = self.settle(model, normal)
+            ends.append((found.log_posterior, dict(self.point), set(self.on)))
+        value, point, on = max(ends, key=lambda e: e[0])
+        better = value > ends[0][0]
+        self.point, self.on = (point, on) if better else begun
+        return better
+
     def _renewed(self) -> tuple[list[White], Normal]:
         whites = self.linearise(renew=True)
         return whites, self.normal(whites)
@@ -111,6 +185,8 @@ class Bench(NormalEquations):
             if self._step(best, normal) < STILL and not more:
                 break
             self.settle(best, normal)
+            if self._refine(best):
+                self.settle(best)
             # weights are those of the first look at a set: no hypothesis gains by what it leaves
             whites = self.linearise(renew=more or best.units != renewed)
             renewed = best.units

@@ -6,6 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
+#: kinds of described forms, over which their prior is spread evenly
+WORDS = (
+    "lag", "crosstalk", "drift", "order", "frequency", "bump", "step_change", "function", "memory",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class Unit:
     equations: tuple[str, ...]
     variants: Sequence[Variant]
     on: Variant | None = None  # once its own parameters are at a point where it acts
+    among: float = 1.0  # alternatives of a form that the prior of its kind is spread over
 
     @property
     def parameters(self) -> list[Parameter]:

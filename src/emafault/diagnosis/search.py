@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
-from .model import Unit
+from .model import WORDS, Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
@@ -90,7 +90,7 @@ class Search:
             self.shapes[unit] = max(self.shapes.get(unit, 0), variant // OTHER_FORM)
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
-        self.counts = listed, every.count("form"), every.count("remainder")
+        self.counts = listed, len(WORDS), every.count("remainder")
         flat = list(candidates.values())
         self.flat = (
             np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
@@ -206,6 +206,7 @@ class Search:
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
+        value -= sum(np.log(self.units[u].among) for u, _ in members)
         value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
         value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..compiled import compiled
 
@@ -34,7 +35,7 @@ def _factor(bands, usable):
 
 
 @compiled
-def _substitute(lower, usable, rows):
+def substituted(lower, usable, rows):
     """Forward substitution, row by row in place; rows not used become zero."""
     n, m = rows.shape
     width = lower.shape[0]
@@ -70,7 +71,7 @@ def _filter(rows, keep, coefficients, scale):
                 for q in range(m):
                     out[k, q] -= f * rows[k - 1 - p, q]
         for q in range(m):
-            out[k, q] *= scale
+            out[k, q] *= scale[k]
     return out
 
 
@@ -108,7 +109,7 @@ def _white_tile(tile, lower, usable, start, before, memory, keep, coefficients, 
                 for q in range(m):
                     out[r, q] -= f * memory[other, q]
         for q in range(m):
-            out[r, q] *= scale
+            out[r, q] *= scale[k]
     return out
 
 
@@ -118,27 +119,26 @@ def products(
     columns: Sequence,
     keep: np.ndarray,
     coefficients: np.ndarray,
-    variance: float,
+    variance: np.ndarray,
 ) -> np.ndarray:
     """(column, column) products of columns, each (row,) or a scalar, whitened and filtered: part after part, so that
     they are never all in memory."""
     n, m = len(bands[0]), len(columns)
-    lower = _factored(bands, usable)
+    lower = factored(bands, usable)
     before, memory = np.zeros((len(bands), m)), np.zeros((len(coefficients) + 1, m))
     out = np.zeros((m, m))
+    scale = 1.0 / np.sqrt(variance)
     for start in range(0, n, TILE):
         end = min(start + TILE, n)
         tile = np.empty((m, end - start))
         for k, c in enumerate(columns):
             tile[k] = c[start:end] if np.ndim(c) else c
-        rows = _white_tile(
-            tile, lower, usable, start, before, memory, keep, np.asarray(coefficients, float), 1.0 / np.sqrt(variance)
-        )
+        rows = _white_tile(tile, lower, usable, start, before, memory, keep, np.asarray(coefficients, float), scale)
         out += rows.T @ rows
     return out
 
 
-def _factored(bands: list[np.ndarray], usable: np.ndarray) -> np.ndarray:
+def factored(bands: list[np.ndarray], usable: np.ndarray) -> np.ndarray:
     n = len(bands[0])
     full = np.zeros((len(bands), n))
     for k, band in enumerate(bands):
@@ -148,13 +148,44 @@ def _factored(bands: list[np.ndarray], usable: np.ndarray) -> np.ndarray:
 
 def whiten(bands: list[np.ndarray], usable: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """(row, column) divided in place by the Cholesky factor of the banded covariance; rows not usable become zero."""
-    _substitute(_factored(bands, usable), usable, rows)
+    substituted(factored(bands, usable), usable, rows)
     return rows
 
 
-def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, variance: float) -> np.ndarray:
-    """(row, column) through the autoregressive model of what a full model leaves; rows not kept become zero."""
+@compiled
+def _substitute_back(lower, x):
+    """Back substitution with the transposed factor, in place."""
+    width, n = lower.shape
+    for k in range(n - 1, -1, -1):
+        for p in range(1, min(width - 1, n - 1 - k) + 1):
+            x[k] -= lower[p, k + p] * x[k + p]
+        x[k] /= lower[0, k]
+
+
+def substituted_back(lower: np.ndarray, usable: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """(row,) a white residual divided once more by the Cholesky factor, transposed: inverse covariance times it."""
+    out = np.array(white, float)
+    _substitute_back(lower, out)
+    return np.where(usable, out, 0.0)
+
+
+def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """(row, column) through the autoregressive model of what a full model leaves, its variance (row,) in each row; rows
+    not kept become zero."""
     return _filter(rows, keep, np.asarray(coefficients, float), 1.0 / np.sqrt(variance))
+
+
+def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarray:
+    """(row,) variance of what a full model leaves about each row, over that of most rows, and at least one.
+
+    What comes and goes in a recording is told from what is noise throughout: it counts where it is not.
+    """
+    if keep.sum() < 4 * width:
+        return np.ones(len(white))
+    power = uniform_filter1d(np.where(keep, white**2, 0.0), width, mode="nearest")
+    share = uniform_filter1d(keep.astype(float), width, mode="nearest")
+    local = power / np.maximum(share, 1.0 / width)
+    return np.maximum(local / max(float(np.median(local[keep])), 1e-300), 1.0)
 
 
 def _without_dips(r: np.ndarray) -> np.ndarray:

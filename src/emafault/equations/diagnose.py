@@ -11,8 +11,10 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
+from ..diagnosis.described import Described
 from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit
+from ..diagnosis.forms import FORMS
 from ..diagnosis.linear import White
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
@@ -294,8 +296,8 @@ def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
 def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
     """Forms that no catalogue lists, and remainders, as the verdict tells them."""
     out = []
+    described = {d.id: d for d in bench.described}
     for form in reading.forms:
-        kind = next(v for k, v in FORM.items() if form.startswith(k))
         unit = next(u for u in bench.units if u.id == form)
         parameters = {}
         for n in model.deviations:
@@ -304,13 +306,19 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
                 value = bench.after({n: model.deviations[n]})[n]
                 sd = model.spread[n]
                 parameters[n] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": p.units}
-        channel = form.split("_", 1)[1].replace("_", " of phase ")
+        if form in described:
+            entry = told_of(described[form], parameters)
+        else:
+            kind = next(v for k, v in FORM.items() if form.startswith(k))
+            channel = form.split("_", 1)[1].replace("_", " of phase ")
+            entry = {
+                "equation": unit.equations[0], "along": "time", "form": kind, "parameters": parameters,
+                "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
+            }  # fmt: skip
         out.append(
             {
-                "unit": form, "equation": unit.equations[0], "along": "time", "form": kind,
-                "probability": float(reading.inclusion[form]),
-                "closed": None, "another_form_of": None, "parameters": parameters, "recordings": list(bench.recordings),
-                "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
+                "unit": form, "probability": float(reading.inclusion[form]), "closed": None, "another_form_of": None,
+                "recordings": list(bench.recordings), **entry,
             }
         )  # fmt: skip
     for left in reading.remainders:
@@ -325,6 +333,28 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
             }
         )  # fmt: skip
     return out
+
+
+def told_of(form: Described, linear: Mapping[str, Mapping]) -> dict[str, Any]:
+    """A described form as the verdict tells it: where, along what, its parameters and a sentence."""
+    module = FORMS[form.word]
+    parameters: dict[str, dict] = {
+        n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units}
+        for n, v, sd, units in form.shape
+        if units
+    }
+    values = np.array([p["value"] for p in linear.values()])
+    half = np.array([0.5 * (p["high"] - p["low"]) for p in linear.values()])
+    for name, value in module.told(values).items():
+        width = float(np.sqrt(np.mean(half**2)))
+        parameters[name] = {"value": value, "low": value - width, "high": value + width, "units": ""}
+    shape = ", ".join(f"{n.replace('_', ' ')} {v:.4g} {u}".rstrip(" 1") for n, v, _, u in form.shape if u)
+    where = EQUATION.get(form.equation, form.equation)
+    along = module.ALONG if form.word != "function" else tuple(module.COORDINATES)[int(form.values["coordinate"])]
+    return {
+        "equation": where, "along": along, "form": form.word, "parameters": parameters,
+        "sentence": f"In the {where.replace('_', ' ')} equation: {form.word.replace('_', ' ')}, {shape}.",
+    }  # fmt: skip
 
 
 def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, float]) -> dict[str, dict]:

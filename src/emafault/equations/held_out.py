@@ -1,6 +1,6 @@
 """Whether what was named holds on the recordings that took no part in naming it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,11 +8,13 @@ from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
 from ..diagnosis.fit import Bench, Fit
+from ..diagnosis.linear import White, assemble
+from ..diagnosis.naming import NAMED
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Model
-from ..effects import EFFECTS
+from ..diagnosis.search import Model, inclusion
 
-CLEAR = 3.0  # nats of predictive density, by which a member has been seen to harm (Kass and Raftery 1995, JASA 90, 773)
+CLEAR = 3.0  # nats of predictive density, by which a member has been seen to help or to harm (Kass and Raftery 1995,
+# JASA 90, 773)
 
 
 def held_to_account(
@@ -25,35 +27,68 @@ def held_to_account(
     predictive densities (Bayes' rule one part of the data after the other), instead of those of all data together. What
     it loses goes to the same set with a remainder in its place: no other effect has been shown by that.
 
+    A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
+    it.
+
     Returns
     -------
-    sets, most probable first, and log predictive ratio by effect
+    sets, most probable first, and log predictive ratio by effect and form
     """
     models = list(whole.models)
     ratios: dict[str, float] = {}
     leading = next((m for m in fit.models if set(named) <= set(m.units)), fit.models[0])
-    members = [e for e in named if e in leading.units]
-    if not members:
-        return models, ratios
-    misfit = _misfit(ladder, explored, fit, leading)
-    for effect in members:
-        less = fit.search.fit(tuple((c.unit, c.variant) for c in leading.choices if c.unit != effect))
-        ratios[effect] = 0.5 * (_misfit(ladder, explored, fit, less) - misfit)
+    for effect in named:
+        if effect not in leading.units:
+            continue
+        ratios[effect] = _ratio(ladder, explored, fit, leading, effect)
         if ratios[effect] < -CLEAR:
             odds = _log_odds(fit.models, effect) + ratios[effect]
             if odds < _log_odds(models, effect):
-                mass = logsumexp([m.log_posterior for m in models if effect in m.units])
+                mass = _log_mass(models, effect)
                 models.append(replace(_instead(whole, models, effect), log_posterior=float(mass - odds)))
+    for form in _unconfirmed(models, explored, ratios):
+        first = next((m for m in fit.models if form in m.units), None)
+        ratios[form] = 0.0 if first is None else _ratio(ladder, explored, fit, first, form)
+        if ratios[form] < CLEAR:
+            mass = _log_mass(models, form)
+            instead = max(_without(whole, models, form), _instead(whole, models, form), key=lambda m: m.log_posterior)
+            models[:] = [m for m in models if form not in m.units]
+            models.append(replace(instead, log_posterior=mass))
     return sorted(models, key=lambda m: -m.log_posterior), ratios
+
+
+def _unconfirmed(models: list[Model], explored: Bench, ratios: Mapping[str, float]) -> Iterator[str]:
+    """Forms that a scan has proposed and that the sets, as they are by then, would tell of."""
+    scanned = {d.id for d in explored.described}
+    while True:
+        told = [u for u, p in inclusion(models).items() if p >= NAMED and u in scanned and u not in ratios]
+        if not told:
+            return
+        yield told[0]
+
+
+def _ratio(ladder: Ladder, explored: Bench, fit: Fit, model: Model, unit: str) -> float:
+    """Log ratio of the predictive densities of a set and of the same without a unit."""
+    less = fit.search.fit(tuple((c.unit, c.variant) for c in model.choices if c.unit != unit))
+    return 0.5 * (_misfit(ladder, explored, fit, less) - _misfit(ladder, explored, fit, model))
+
+
+def _log_mass(models: Sequence[Model], unit: str) -> float:
+    return float(logsumexp([m.log_posterior for m in models if unit in m.units]))
+
+
+def _without(whole: Fit, models: Sequence[Model], unit: str) -> Model:
+    """The leading set with a unit, less that one."""
+    leading = max((m for m in models if unit in m.units), key=lambda m: m.log_posterior)
+    return whole.search.fit(tuple((c.unit, c.variant) for c in leading.choices if c.unit != unit))
 
 
 def _instead(whole: Fit, models: Sequence[Model], effect: str) -> Model:
     """The leading set with an effect, a remainder in that one's first equation in its place."""
     leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
     members = [(c.unit, c.variant) for c in leading.choices if c.unit != effect]
-    places = [
-        u for q in EFFECTS[effect].equations for u, v in whole.search.candidates if u.startswith(f"remainder:{q}")
-    ]
+    equations = whole.search.units[effect].equations
+    places = [u for q in equations for u, v in whole.search.candidates if u.startswith(f"remainder:{q}")]
     if places and not set(places) & {u for u, _ in members}:
         members.append((places[0], 0))
     return whole.search.fit(tuple(members))
@@ -71,13 +106,32 @@ def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
         for c in model.choices
         if any("@" in n for n in fit.search.candidates[c.unit, c.variant].names) and c.unit.startswith("remainder:")
     }
-    found = 0.0
-    for w in ladder.blocks(inserted.values, remainders=bool(width), also=also, inserted=inserted):
+    whites = ladder.blocks(inserted.values, remainders=bool(width), also=also, inserted=inserted)
+    found = _occam(ladder, whites, model, fit)
+    for w in whites:
         found += float(w.gram[-1, -1])
         own = [k for k, n in enumerate(w.names) if n.startswith("remainder.") and "@" in n]
         if own and w.equation in width:
             M, b = w.gram[np.ix_(own, own)], w.gram[own, -1]
             found -= float(b @ np.linalg.solve(M + np.eye(len(own)) / width[w.equation] ** 2, b))
+    return found
+
+
+def _occam(ladder: Ladder, whites: Sequence[White], model: Model, fit: Fit) -> float:
+    """What a model loses for parameters that each confirm recording has its own of: twice the log of how much narrower
+    the recording makes them."""
+    width: dict[str, float] = {}  # of the parameters of a recording, by name without it
+    for c in model.choices:
+        for n in fit.search.candidates[c.unit, c.variant].names:
+            if is_parameter(n) and "@" in n:
+                width[n.rsplit("@", 1)[0]] = c.width
+    found = 0.0
+    for recording in ladder.recordings if width else ():
+        mine = [w for w in whites if w.recording == recording]
+        names = [n for n in dict.fromkeys(n for w in mine for n in w.names) if n.rsplit("@", 1)[0] in width]
+        sd = np.array([width[n.rsplit("@", 1)[0]] * ladder.parameters[n].sd for n in names])
+        H = assemble(mine, names, {}).H
+        found += float(np.linalg.slogdet(np.eye(len(names)) + H * np.outer(sd, sd))[1])
     return found
 
 

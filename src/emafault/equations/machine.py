@@ -31,6 +31,13 @@ EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: co
 ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
+#: channels whose faults show in an equation
+CHANNELS = {
+    "sensor_speed": ("angle",), "torque": ("angle",), "position": ("angle", "output"),
+    "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
+    "electrical_b": ("current_b",), "electrical_c": ("current_c",),
+}  # fmt: skip
+BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 
 
@@ -163,7 +170,7 @@ class ReferenceActuator:
                 Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
                 for side in ("late", "early")
             ]
-            out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants))
+            out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
         pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
         # one pair: what both others add to a phase together is a gain, for the three add up to nothing
         variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
@@ -171,7 +178,10 @@ class ReferenceActuator:
         for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
             for j in PER_PHASE:
                 parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings]
-                out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)]))
+                drift = Unit(
+                    f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0
+                )
+                out.append(drift)
         return out
 
     # ---- equations
@@ -197,6 +207,35 @@ class ReferenceActuator:
                 self._disturbed[name] = rec.disturbed(1)
             rec = self._disturbed[name]
         return self._recording(values, rec, wanted)
+
+    # ---- the measuring chain
+    def channels(self, equation: str) -> tuple[str, ...]:
+        """Channels in which a form that shows in an equation may lie, rather than in the equation itself."""
+        return CHANNELS.get(equation, ())
+
+    def channel(self, channel: str) -> tuple[str, float]:
+        """Equation that a channel's faults are told in, and the noise of its samples."""
+        quantity = channel.split("_")[0]
+        noise = next(iter(self.recordings.values())).noise
+        return f"sensor_{quantity}" if quantity != "output" else "position", float(
+            getattr(noise, {"output": "position"}.get(quantity, quantity))
+        )
+
+    def seen_in(self, channel: str, name: str, x: np.ndarray) -> dict[str, np.ndarray]:
+        """By equation (column, row): what signals x (column, sample) on a channel take out of the residuals, each."""
+        rec = self.recordings[name]
+        off = {n: p.off for n, p in self.parameters.items()}
+        before = self._recording(off, rec, ())
+        step = self.channel(channel)[1]
+        found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}
+        for row in x:
+            for b, at in zip(before, self._recording(off, rec.less(channel, step * row), ()), strict=True):
+                found[b.equation].append((at.residual - b.residual) / step)
+        return {e: np.array(rows) for e, rows in found.items()}
+
+    def sampled(self, name: str) -> dict[str, Any]:
+        """What the samples of a recording lie along."""
+        return self._functions_of(self.recordings[name])
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
         point = Point(values, rec.name, wanted)
@@ -282,7 +321,8 @@ class ReferenceActuator:
         x = rec.actuator.pole_pairs * rec.middle
         base = {
             "direction": rec.direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
-            "rotor_angle": np.mod(rec.middle, 2 * np.pi), "temperature": np.full(rec.size, rec.ambient),
+            "rotor_angle": np.mod(rec.middle, 2 * np.pi), "angle": rec.middle, "output_angle": rec.shaft,
+            "temperature": np.full(rec.size, rec.ambient),
         }  # fmt: skip
         phi = [
             np.ones(rec.size), rec.direction, np.abs(w), w * w, level - 0.3, t,
@@ -316,6 +356,10 @@ class ReferenceActuator:
         elif equation == "position":
             drivers += [rec.direction, rec.acceleration / 1e3]
         of: Callable[[np.ndarray], np.ndarray] | None = None
+        kinds: dict[str, Any] = {
+            "slow": SLOW_FUNCTIONS,
+            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
+        }
         if equation == "control":
             width = control.block_length(rec)
             blocks = (np.arange(rec.size // width - 1) + 1) * width
@@ -325,7 +369,8 @@ class ReferenceActuator:
             of = rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
         elif equation.startswith("electrical") and rec.current_end is None:
             of = electrical.averaging(state, "abc".index(equation[-1]))
-        kinds = {"slow": SLOW_FUNCTIONS, "each": [f - (equation == "control" and f > LEVEL) for f in EACH]}
+            # what means over runs leave of ripple and commutations beats with both
+            kinds |= {"highest_order": 0.5 * rec.actuator.pole_pairs, "highest_frequency": BEATS / electrical.RUN}
         if of is None:
             return {"drivers": drivers, **kinds}
         rows = [of(d) for d in drivers]

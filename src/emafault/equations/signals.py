@@ -103,13 +103,28 @@ class Signals:
             return x + sigma * rng.standard_normal(x.shape)
 
         s = self.noise
-        end = None if self.current_end is None else more(self.current_end, s.current_end)
-        bus = None if self.bus is None else more(self.bus, s.bus_voltage)
-        out = Signals(
-            self.name, self.actuator, self.interval, more(self.voltage, s.voltage), more(self.current, s.current), end,
-            more(self.speed_recorded, s.speed), more(self.angle, s.angle), more(self.output, s.position), self.command,
-            bus, self.ambient, self.health, s,
+        return self._changed(
+            voltage=more(self.voltage, s.voltage), current=more(self.current, s.current),
+            current_end=None if self.current_end is None else more(self.current_end, s.current_end),
+            speed_recorded=more(self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
+            output=more(self.output, s.position), bus=None if self.bus is None else more(self.bus, s.bus_voltage),
         )  # fmt: skip
+
+    def less(self, channel: str, x: np.ndarray) -> "Signals":
+        """A copy with (sample,) x taken off a channel: ``angle``, ``output``, or the current of a phase."""
+        if channel == "angle":
+            return self._changed(angle=self.angle - x)
+        if channel == "output":
+            return self._changed(output=self.output - x)
+        unit = np.eye(3)["abc".index(channel[-1])]
+        end = None
+        if self.current_end is not None:
+            end = self.current_end - np.outer(0.5 * (x + np.append(x[1:], x[-1])), unit)
+        return self._changed(current=self.current - np.outer(x, unit), current_end=end)
+
+    def _changed(self, **signals: Any) -> "Signals":
+        """A copy with other signals; what is masked and along what rows lie stays."""
+        out = replace(self, **signals)
         out.speed_step, out.current_step = self.speed_step, self.current_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
         return out

@@ -47,6 +47,7 @@ class MeasuredBench(Bench):
     """The fit of a measured machine: noise as its rows state it, a remainder that is smooth or free at each place."""
 
     searching = MeasuredSearch
+    describing = False
     reaches = (np.inf, np.inf)  # priors are as wide as the signals allow
     settled = SETTLED
 

@@ -1,0 +1,189 @@
+"""Described forms as candidate causes: proposed by scans of what is left, then columns like every other unit's."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .forms import FORMS
+from .left import Left, gain
+from .linearisation import SETTINGS
+from .model import Block, Parameter, Unit, Variant
+
+PROPOSED = 12  # forms that a scan proposes at most
+CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
+REFINED = 3  # rounds over the parameters of a shape
+STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
+SAME = 4.0  # standard deviations
+SPAN = 3.0  # widest prior of a coefficient over the noise of a row
+
+
+@dataclass(frozen=True)
+class Described:
+    """A form in one equation: its word, the driver that it multiplies and its shape."""
+
+    id: str  # of its unit
+    word: str
+    equation: str
+    driver: int
+    shape: tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation, unit
+    scale: float  # of its coefficients
+    among: float  # alternatives that the scan could have told from it
+    channel: str = ""  # of the measuring chain, where it lies in the recorded signal and not in the equation
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its shape by name."""
+        return {n: v for n, v, _, _ in self.shape}
+
+    def same(self, other: "Described") -> bool:
+        """Whether it is another where this one is, its shape no further than scans of both may be off."""
+        if (self.word, self.equation, self.driver, self.channel) != (
+            other.word, other.equation, other.driver, other.channel,
+        ):  # fmt: skip
+            return False
+        pairs = zip(self.shape, other.shape, strict=True)
+        return all(abs(a[1] - b[1]) <= SAME * np.hypot(a[2], b[2]) + 1e-9 * abs(a[1]) for a, b in pairs)
+
+    def names(self, recording: str) -> list[str]:
+        """Its parameters as a recording has them."""
+        form = FORMS[self.word]
+        return [f"form.{self.id}.{c}" + (f"@{recording}" if form.EACH else "") for c in form.COEFFICIENTS]
+
+    def unit(self, recordings: Sequence[str]) -> Unit:
+        """A candidate cause."""
+        each = [n for r in (recordings if FORMS[self.word].EACH else recordings[:1]) for n in self.names(r)]
+        parameters = [Parameter(n, 0.0, 0.0, SPAN * self.scale) for n in each]
+        return Unit(self.id, "form", (self.equation,), [Variant(parameters)], among=self.among)
+
+    def columns(self, block: Block) -> np.ndarray:
+        """(column, row) of a block: the derivatives of its residual."""
+        rows = FORMS[self.word].columns(block.coordinates, self.values)
+        return -rows * np.asarray(block.coordinates["drivers"][self.driver])
+
+
+class WithForms:
+    """A machine whose equations have described forms too."""
+
+    def __init__(self, machine, forms: Sequence[Described]):
+        self.machine, self.forms = machine, tuple(forms)
+        more = [f.unit(list(machine.recordings)) for f in self.forms]
+        self.units = [*machine.units, *more]
+        self.parameters = {**machine.parameters, **{p.name: p for u in more for p in u.parameters}}
+        self._columns: dict[tuple, np.ndarray] = {}
+
+    def __getattr__(self, name: str):
+        return getattr(self.machine, name)
+
+    def blocks(
+        self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
+    ) -> list[Block]:
+        """See the machine: its blocks, with the forms' columns and what their present coefficients take out."""
+        blocks = self.machine.blocks(values, name, disturbed=disturbed, wanted=wanted)
+        for block in blocks:
+            for form in self.forms:
+                if not form.channel and form.equation != block.equation:
+                    continue
+                names = form.names(block.recording)
+                here = np.array([values.get(n, 0.0) for n in names])
+                if not here.any() and wanted is not None and not set(names) & set(wanted):
+                    continue
+                key = block.recording, block.equation, form.id, form.shape
+                if key not in self._columns:
+                    if form.channel:
+                        x = FORMS[form.word].columns(self.machine.sampled(name), form.values)
+                        for equation, rows in self.machine.seen_in(form.channel, name, x).items():
+                            self._columns[block.recording, equation, form.id, form.shape] = rows
+                    else:
+                        self._columns[key] = form.columns(block)
+                columns = self._columns[key]
+                if not columns.any():
+                    continue
+                block.residual = block.residual + here @ columns
+                block.columns |= dict(zip(names, columns, strict=True))
+        return blocks
+
+
+def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], mark: str) -> list[Described]:
+    """Forms that stand out of what blocks leave, those most probable by themselves first.
+
+    Parameters
+    ----------
+    carried : by recording and equation, the weights of its rows
+    mark : of this scan, in the ids of what it proposes
+    """
+    of: dict[str, list[Block]] = {}
+    for b in blocks:
+        if b.equation not in SETTINGS:
+            of.setdefault(b.equation, []).append(b)
+    places = sum(len(b[0].coordinates["drivers"]) for b in of.values())
+    found: list[tuple[float, Described]] = []
+    for equation, own in of.items():
+        left = Left(equation, own, [carried[b.recording][equation] for b in own])
+        for word, form in FORMS.items():
+            coarse = [(form.coarse(left, d), d) for d in range(left.drivers)]
+            (shape, _), driver = max(
+                (c for c in coarse if c[0] is not None), key=lambda c: c[0][1], default=((None, 0), 0)
+            )
+            if shape is None:
+                continue
+            name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
+            fine = form.fine(left, driver, shape)
+            value, best = max(((f.evidence - float(np.log(f.among * places)), f) for f in fine), key=lambda x: x[0])
+            if value > 0.0:
+                among = best.among * places
+                found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
+    found.sort(key=lambda x: -x[0])
+    out = [d for _, d in found][:PROPOSED]
+    return [*out, *(c for d in out[:CHANNELED] if d.driver == 0 for c in _in_channels(machine, d))]
+
+
+def _in_channels(machine, form: Described) -> list[Described]:
+    """The same form in the channels of the measuring chain that the equation sees."""
+    names = [c for c in machine.channels(form.equation) if c.split("_")[0] in FORMS[form.word].CHANNELS]
+    out = []
+    for channel in names:
+        equation, noise = machine.channel(channel)
+        name = f"{form.id}_{channel}"
+        out.append(
+            replace(form, id=name, equation=equation, channel=channel, scale=noise, among=form.among * len(names))
+        )
+    return out
+
+
+def refined(
+    form: Described, blocks: Sequence[Block], carried: Mapping[str, Mapping], values: Mapping[str, float]
+) -> Described:
+    """A form with the shape that explains most of what is left with it out, near the one that it has.
+
+    ``blocks`` are those at the point that ``values`` has, the form's own coefficients among them.
+    """
+    if form.channel:  # its columns are differences of all equations: too dear to look around
+        return form
+    own = []
+    for b in blocks:
+        if b.equation == form.equation:
+            here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
+            own.append(replace(b, residual=b.residual - here @ form.columns(b)))
+    left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own])
+    module = FORMS[form.word]
+
+    def value(at: Described) -> float:
+        parts = left.each(lambda b: module.columns(b.coordinates, at.values), at.driver)
+        if module.EACH:
+            return sum(gain(*p) for p in parts)
+        return gain(np.sum([g for g, _ in parts], axis=0), np.sum([G for _, G in parts], axis=0))
+
+    best = value(form)
+    for _ in range(REFINED):
+        for k, (name, at, width, unit) in enumerate(form.shape):
+            if width == 0.0:
+                continue
+            for step in STEPS:
+                trial = replace(
+                    form, shape=(*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
+                )
+                found = value(trial)
+                if found > best:
+                    best, form = found, trial
+    return form

@@ -1,0 +1,66 @@
+"""A Gaussian about one angle of the turn."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..left import Found, Left, Shape, beside_first, of_cells, singly
+
+ALONG = "rotor_angle"
+EACH = False
+CHANNELS: tuple[str, ...] = ()
+COEFFICIENTS = ("depth",)
+CELLS = 36  # of the turn
+EDGE = 2.0 * np.pi / CELLS
+WIDTHS = (0.1, 0.2, 0.4, 0.7)  # rad
+
+
+def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
+    """(1, row) one at the centre."""
+    return _about(coordinates["rotor_angle"], shape["centre"], shape["width"])[None]
+
+
+def _about(angle, centre: float, width: float) -> np.ndarray:
+    distance = np.mod(np.asarray(angle) - centre + np.pi, 2.0 * np.pi) - np.pi
+    return np.exp(-0.5 * (distance / width) ** 2)
+
+
+def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
+    """The best of centres and widths, each a sum of cells of the turn."""
+    if "angle" not in left.blocks[0].coordinates:
+        return None
+    cells = left.cells(lambda b: (np.asarray(b.coordinates["rotor_angle"]) / EDGE).astype(int), CELLS, driver)
+    middle = EDGE * (np.arange(CELLS) + 0.5)
+    tried = [{"centre": float(c), "width": w} for w in WIDTHS for c in middle]
+    values = singly(*of_cells(np.array([_about(middle, t["centre"], t["width"]) for t in tried]), *cells))
+    return tried[int(np.argmax(values))], float(values.max())
+
+
+def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
+    """Centre and width."""
+    centre, width = shape["centre"], shape["width"]
+    reach, ratio = EDGE, 2.0
+    for _ in range(3):
+        tried = [(centre + reach * x, width * ratio**y) for x in np.linspace(-1, 1, 5) for y in (-1.0, 0.0, 1.0)]
+
+        def of(b, tried=tried):
+            angle = b.coordinates["rotor_angle"]
+            return np.array([np.ones(len(angle)), *(_about(angle, *s) for s in tried)])
+
+        values = singly(*beside_first(*left.products(of, driver)))
+        (centre, width), reach, ratio = tried[int(np.argmax(values))], reach / 2.5, ratio**0.5
+    weight = np.exp(values - values.max())
+    spread = [
+        float(np.sqrt(weight @ (np.array([s[k] for s in tried]) - at) ** 2 / weight.sum()))
+        for k, at in enumerate((centre, width))
+    ]
+    found = (
+        ("centre", float(np.mod(centre, 2.0 * np.pi)), spread[0] + 0.5 * reach, "rad"),
+        ("width", width, spread[1] + 0.2 * width * (ratio - 1.0), "rad"),
+    )
+    return [Found(found, float(values.max()), float(CELLS * len(WIDTHS)))]
+
+
+def told(values: np.ndarray) -> dict[str, float]:
+    """The depth itself."""
+    return {"depth": float(values[0])}

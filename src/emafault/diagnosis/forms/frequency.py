@@ -1,0 +1,60 @@
+"""A wave of a fixed frequency, its phase another in each recording."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..left import Found, Left, Shape, gain
+from .spectrum import above, refined
+
+ALONG = "time"
+EACH = True
+CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
+COEFFICIENTS = ("cosine", "sine")
+PERIODS = 3.0  # fewest in a recording
+AROUND = 30.0  # lines whose level a line stands out of
+HIGHEST = 0.45  # of the sampling rate
+
+
+def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
+    """(2, row) cosine and sine."""
+    x = 2.0 * np.pi * shape["frequency"] * np.asarray(coordinates["time"])
+    return np.array([np.cos(x), np.sin(x)])
+
+
+def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
+    """The frequency of the highest line of the recordings' spectra together."""
+    step = _step(left)
+    size = 1 << int(np.ceil(np.log2(2.0 * left.longest / step + 2)))
+    frequencies = np.fft.rfftfreq(size, step)
+    total = np.zeros(len(frequencies))
+    for b, w in zip(left.blocks, left.weighed, strict=True):
+        t = np.asarray(b.coordinates["time"])
+        cells = np.bincount(((t - t[0]) / step).astype(int), w * b.coordinates["drivers"][driver], size)[:size]
+        ratio = above(np.abs(np.fft.rfft(cells)) ** 2, 2 * int(AROUND * size * step / (t[-1] - t[0])) + 1)
+        highest = b.coordinates.get("highest_frequency", HIGHEST / np.median(np.diff(t)))
+        known = (frequencies > PERIODS / (t[-1] - t[0])) & (frequencies < highest)
+        total += np.where(known, ratio, 0.0)
+    shape = {"frequency": float(frequencies[int(np.argmax(total))])}
+    return shape, _value(left, driver, shape)
+
+
+def _step(left: Left) -> float:
+    return min(float(np.median(np.diff(b.coordinates["time"]))) for b in left.blocks)
+
+
+def _value(left: Left, driver: int, shape: Shape) -> float:
+    return sum(gain(*p) for p in left.each(lambda b: columns(b.coordinates, shape), driver))
+
+
+def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
+    """The frequency."""
+    f, deviation = refined(shape["frequency"], 0.5 / left.longest, lambda x: _value(left, driver, {"frequency": x}))
+    value = _value(left, driver, {"frequency": f})
+    return [Found((("frequency", f, deviation, "Hz"),), value, max(1.0, left.longest * HIGHEST / _step(left)))]
+
+
+def told(values: np.ndarray) -> dict[str, float]:
+    """Amplitude: root mean square over the recordings of what each has."""
+    pairs = np.asarray(values).reshape(-1, 2)
+    return {"amplitude": float(np.sqrt(np.mean(np.sum(pairs**2, axis=1))))}

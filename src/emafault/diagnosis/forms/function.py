@@ -1,0 +1,66 @@
+"""A function of one coordinate, piecewise linear between six knots."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..left import Found, Left, Shape, gain, of_cells, without
+from ..model import Block
+
+ALONG = "function"  # the coordinate that its shape names
+EACH = False
+CHANNELS: tuple[str, ...] = ()
+KNOTS = 6
+COEFFICIENTS = tuple(f"at_{k + 1}" for k in range(KNOTS))
+#: coordinate -> unit
+COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
+CELLS = 40  # of the range
+FEWEST = 3  # temperatures that show a function of it
+
+
+def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
+    """(knot, row) hats."""
+    along = tuple(COORDINATES)[int(shape["coordinate"])]
+    return _hats(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
+
+
+def _hats(x, knots: np.ndarray) -> np.ndarray:
+    return np.array([np.interp(x, knots, row) for row in np.eye(len(knots))])
+
+
+def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
+    """The coordinate along which most stands out, a constant of the driver apart."""
+    best: tuple[Shape, float] | None = None
+    for number, along in enumerate(COORDINATES):
+        if along not in left.blocks[0].coordinates:
+            continue
+        x = [np.asarray(b.coordinates[along]) for b in left.blocks]
+        low, high = float(min(v.min() for v in x)), float(max(v.max() for v in x))
+        if (along == "temperature" and len({float(v[0]) for v in x}) < FEWEST) or high - low < 1e-9:
+            continue
+        shape = {"coordinate": float(number), "from": low, "to": high}
+        step = (high - low) / CELLS
+
+        def cell(b: Block, along: str = along, low: float = low, step: float = step) -> np.ndarray:
+            return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
+
+        cells = left.cells(cell, CELLS, driver)
+        hats = _hats(low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
+        value = gain(*of_cells(hats, *cells))
+        if best is None or value > best[1]:
+            best = shape, value
+    return best
+
+
+def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
+    """The same: knots are where the range has them."""
+    products = left.products(lambda b: columns(b.coordinates, shape), driver)
+    value = gain(*without(*products, np.ones(KNOTS)))
+    along = tuple(COORDINATES)[int(shape["coordinate"])]
+    found = tuple((n, v, 0.0, "" if n == "coordinate" else COORDINATES[along]) for n, v in shape.items())
+    return [Found(found, value, float(len(COORDINATES)))]
+
+
+def told(values: np.ndarray) -> dict[str, float]:
+    """Values at the knots."""
+    return dict(zip(COEFFICIENTS, map(float, values), strict=True))

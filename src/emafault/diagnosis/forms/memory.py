@@ -1,0 +1,72 @@
+"""What builds up with a time constant and is driven by loss or by speed, from nothing at each recording's start."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..left import Found, Left, Shape, singly
+
+ALONG = "time"
+EACH = False
+CHANNELS: tuple[str, ...] = ()
+COEFFICIENTS = ("gain",)
+SOURCES = ("loss", "speed")  # current squared (A2), magnitude of the speed (100 rad/s)
+CONSTANTS = np.geomspace(0.05, 1.0, 6)  # of the longest recording
+FINER = np.geomspace(0.6, 1.0 / 0.6, 7)
+
+
+def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
+    """(1, row) the source through a first-order lag."""
+    return _filtered(coordinates, int(shape["source"]), shape["time_constant"])[None]
+
+
+def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
+    if SOURCES[source] == "loss":
+        x = (0.5 * np.asarray(coordinates["current"])) ** 2
+    else:
+        x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
+    share = 1.0 - np.exp(-float(np.median(np.diff(coordinates["time"]))) / constant)
+    return lfilter([share], [1.0, share - 1.0], x)
+
+
+def _values(left: Left, driver: int, tried: list[tuple[int, float]]) -> np.ndarray:
+    return singly(*left.products(lambda b: np.array([_filtered(b.coordinates, *s) for s in tried]), driver))
+
+
+def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
+    """The best of sources and time constants."""
+    if any(n not in left.blocks[0].coordinates for n in ("current", "rotor_speed")):
+        return None
+    tried = [(k, float(left.longest * c)) for k in range(len(SOURCES)) for c in CONSTANTS]
+    values = singly(*_roughly(left, driver, tried))
+    source, constant = tried[int(np.argmax(values))]
+    return {"source": float(source), "time_constant": constant}, float(values.max())
+
+
+def _roughly(left: Left, driver: int, tried: list[tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Score and information, as of slow columns, of each by itself."""
+    g, power = np.zeros(len(tried)), np.zeros(len(tried))
+    for b, weighed, known in zip(left.blocks, left.weighed, left.known, strict=True):
+        d = np.asarray(b.coordinates["drivers"][driver])
+        for k, s in enumerate(tried):
+            x = _filtered(b.coordinates, *s)
+            g[k] += x @ (weighed * d)
+            power[k] += np.square(x) @ (known * d * d)
+    return g, np.diag(power)
+
+
+def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
+    """The time constant."""
+    tried = [(int(shape["source"]), float(shape["time_constant"] * f)) for f in FINER]
+    values = _values(left, driver, tried)
+    k = int(np.argmax(values))
+    at, weight = tried[k][1], np.exp(values - values[k])
+    spread = float(np.sqrt(weight @ (np.array([c for _, c in tried]) - at) ** 2 / weight.sum())) + 0.05 * at
+    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, spread, "s"))
+    return [Found(found, float(values[k]), float(len(SOURCES) * len(CONSTANTS)))]
+
+
+def told(values: np.ndarray) -> dict[str, float]:
+    """The gain itself."""
+    return {"gain": float(values[0])}

@@ -1,0 +1,71 @@
+"""A wave along the angle of the rotor, a whole number of times a turn or not, in phase over all recordings."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..left import Found, Left, Shape, gain
+from .spectrum import above, refined
+
+ALONG = "order"
+EACH = False
+CHANNELS: tuple[str, ...] = ("angle",)  # of the measuring chain that may have it
+COEFFICIENTS = ("cosine", "sine")
+CELLS = 64  # a turn
+HIGHEST = 24.0
+TURNS = 3.0  # fewest that show an order
+AROUND = 30.0  # lines whose level a line stands out of
+
+
+def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
+    """(2, row) cosine and sine."""
+    x = shape["order"] * np.asarray(coordinates["angle"])
+    return np.array([np.cos(x), np.sin(x)])
+
+
+def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
+    """The order of the highest line of the spectrum along the angle, of all recordings together."""
+    if "angle" not in left.blocks[0].coordinates:
+        return None
+    first, turns = _span(left)
+    if turns < TURNS:
+        return None
+    cells = np.zeros(int(turns * CELLS) + 2)
+    for b, w in zip(left.blocks, left.weighed, strict=True):
+        at = ((np.asarray(b.coordinates["angle"]) - first) / (2.0 * np.pi) * CELLS).astype(int)
+        cells += np.bincount(at, w * b.coordinates["drivers"][driver], len(cells))
+    size = 1 << int(np.ceil(np.log2(2 * len(cells))))
+    power = np.abs(np.fft.rfft(cells, size)) ** 2
+    orders = np.arange(len(power)) * CELLS / size
+    ratio = above(power, 2 * int(AROUND * size / len(cells)) + 1)
+    highest = min(HIGHEST, *(b.coordinates.get("highest_order", HIGHEST) for b in left.blocks))
+    ratio[(orders < 2.0 / turns) | (orders > highest)] = 0.0
+    shape = {"order": float(orders[int(np.argmax(ratio))])}
+    return shape, _value(left, driver, shape)
+
+
+def _span(left: Left) -> tuple[float, float]:
+    """Lowest angle (rad) and the turns that all recordings together go over."""
+    angles = [np.asarray(b.coordinates["angle"]) for b in left.blocks]
+    first = min(a.min() for a in angles)
+    return float(first), float((max(a.max() for a in angles) - first) / (2.0 * np.pi))
+
+
+def _value(left: Left, driver: int, shape: Shape) -> float:
+    return gain(*left.products(lambda b: columns(b.coordinates, shape), driver))
+
+
+def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
+    """The order itself, and the whole number next to it: what turns with the rotor is as likely as all others."""
+    _, turns = _span(left)
+    order, deviation = refined(shape["order"], 0.5 / turns, lambda x: _value(left, driver, {"order": x}))
+    tried = [((("order", order, deviation, "1"),), max(1.0, 2.0 * HIGHEST * turns))]
+    whole = float(np.round(order))
+    if whole >= 1.0 and abs(order - whole) < 1.0 / turns:
+        tried.append(((("order", whole, 0.0, "1"),), 2.0 * HIGHEST))
+    return [Found(s, _value(left, driver, {"order": s[0][1]}), among) for s, among in tried]
+
+
+def told(values: np.ndarray) -> dict[str, float]:
+    """Amplitude and phase."""
+    return {"amplitude": float(np.hypot(*values)), "phase": float(np.arctan2(values[1], values[0]))}
