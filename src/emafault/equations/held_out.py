@@ -1,6 +1,6 @@
 """Whether what was named holds on the recordings that took no part in naming it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from scipy.special import logsumexp
 from ..diagnosis.closure import Ladder
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
+from ..diagnosis.model import LISTED
 from ..diagnosis.naming import NAMED
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, inclusion
@@ -25,7 +26,9 @@ def held_to_account(
     The explored recordings are fitted with a named effect and without; both predict the confirm recordings, frozen. One
     whose prediction is clearly the worse has the odds that the explored recordings gave it times the ratio of the
     predictive densities (Bayes' rule one part of the data after the other), instead of those of all data together. What
-    it loses goes to the same set with a remainder in its place: no other effect has been shown by that.
+    it loses goes to the same set with a remainder in its place: no other effect has been shown by that. What is named
+    in consequence is held to account in turn. Where the explored recordings' set as a whole predicts worse than without
+    its effects, each is tried by itself.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
     it.
@@ -36,19 +39,17 @@ def held_to_account(
     """
     models = list(whole.models)
     ratios: dict[str, float] = {}
-    leading = next((m for m in fit.models if set(named) <= set(m.units)), fit.models[0])
-    for effect in named:
-        if effect not in leading.units:
-            continue
-        ratios[effect] = _ratio(ladder, explored, fit, leading, effect)
+    account = _Account(ladder, explored, fit, named)
+    for effect in _untold(models, ratios, lambda u: whole.search.units[u].kind in LISTED):
+        ratios[effect] = account.ratio(effect)
         if ratios[effect] < -CLEAR:
             odds = _log_odds(fit.models, effect) + ratios[effect]
             if odds < _log_odds(models, effect):
                 mass = _log_mass(models, effect)
                 models.append(replace(_instead(whole, models, effect), log_posterior=float(mass - odds)))
-    for form in _unconfirmed(models, explored, ratios):
-        first = next((m for m in fit.models if form in m.units), None)
-        ratios[form] = 0.0 if first is None else _ratio(ladder, explored, fit, first, form)
+    scanned = {d.id for d in explored.described}
+    for form in _untold(models, ratios, scanned.__contains__):
+        ratios[form] = account.ratio(form)
         if ratios[form] < CLEAR:
             mass = _log_mass(models, form)
             instead = max(_without(whole, models, form), _instead(whole, models, form), key=lambda m: m.log_posterior)
@@ -57,20 +58,44 @@ def held_to_account(
     return sorted(models, key=lambda m: -m.log_posterior), ratios
 
 
-def _unconfirmed(models: list[Model], explored: Bench, ratios: Mapping[str, float]) -> Iterator[str]:
-    """Forms that a scan has proposed and that the sets, as they are by then, would tell of."""
-    scanned = {d.id for d in explored.described}
+def _untold(models: list[Model], ratios: Mapping[str, float], which: Callable[[str], bool]) -> Iterator[str]:
+    """Units that the sets, as they are by then, would name, and that have not been held to account."""
     while True:
-        told = [u for u, p in inclusion(models).items() if p >= NAMED and u in scanned and u not in ratios]
-        if not told:
+        left = [u for u, p in inclusion(models).items() if p >= NAMED and u not in ratios and which(u)]
+        if not left:
             return
-        yield told[0]
+        yield left[0]
 
 
-def _ratio(ladder: Ladder, explored: Bench, fit: Fit, model: Model, unit: str) -> float:
-    """Log ratio of the predictive densities of a set and of the same without a unit."""
-    less = fit.search.fit(tuple((c.unit, c.variant) for c in model.choices if c.unit != unit))
-    return 0.5 * (_misfit(ladder, explored, fit, less) - _misfit(ladder, explored, fit, model))
+class _Account:
+    """Log predictive ratios on the confirm recordings."""
+
+    def __init__(self, ladder: Ladder, explored: Bench, fit: Fit, named: Sequence[str]):
+        self.ladder, self.explored, self.fit = ladder, explored, fit
+        self.leading = next((m for m in fit.models if set(named) <= set(m.units)), fit.models[0])
+        kinds = {u.id: u.kind for u in fit.search.units.values()}
+        self.base = fit.search.fit(
+            tuple((c.unit, c.variant) for c in self.leading.choices if kinds.get(c.unit) not in LISTED)
+        )
+        self.misfits: dict[tuple, float] = {}
+
+    def ratio(self, unit: str) -> float:
+        """Of a set with a unit over the same without it; 0 where the explored recordings never had the unit."""
+        inside = self.leading
+        if unit not in inside.units or self._misfit(self.leading) > self._misfit(self.base) + 2.0 * CLEAR:
+            first = next((m for m in self.fit.models if unit in m.units), None)
+            if first is None:
+                return 0.0
+            mine = [(c.unit, c.variant) for c in self.base.choices if c.unit != unit]
+            mine += [(c.unit, c.variant) for c in first.choices if c.unit == unit]
+            inside = self.fit.search.fit(tuple(mine))
+        less = self.fit.search.fit(tuple((c.unit, c.variant) for c in inside.choices if c.unit != unit))
+        return 0.5 * (self._misfit(less) - self._misfit(inside))
+
+    def _misfit(self, model: Model) -> float:
+        if model.choices not in self.misfits:
+            self.misfits[model.choices] = _misfit(self.ladder, self.explored, self.fit, model)
+        return self.misfits[model.choices]
 
 
 def _log_mass(models: Sequence[Model], unit: str) -> float:
