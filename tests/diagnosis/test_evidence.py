@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from emafault.diagnosis.evidence import Normal, log_evidence, marginalise
-from emafault.diagnosis.whitening import autoregression, filtered, whiten
+from emafault.diagnosis.whitening import coloured, filtered, whiten
 
 
 @pytest.fixture
@@ -78,8 +78,7 @@ def test_autoregression_makes_low_frequencies_white():
     for k in range(1, len(e)):
         x[k] = 0.9 * x[k - 1] + e[k]
     keep = np.ones(len(x), bool)
-    coefficients, variance = autoregression(x, keep)
-    white = filtered(whiten([np.ones(len(x))], keep, x[:, None].copy()), keep, coefficients, variance)[:, 0]
+    white = filtered(whiten([np.ones(len(x))], keep, x[:, None].copy()), coloured(x, keep))[:, 0]
     assert _low_power(x) > 20.0
     assert 0.5 < _low_power(white) < 2.0
 
@@ -88,6 +87,5 @@ def test_a_hole_in_the_spectrum_is_not_believed():
     rng = np.random.default_rng(3)
     x = np.diff(rng.standard_normal(20001))
     keep = np.ones(len(x), bool)
-    coefficients, variance = autoregression(x, keep)
-    bias = filtered(np.ones((len(x), 1)), keep, coefficients, variance)[100:, 0]
+    bias = filtered(np.ones((len(x), 1)), coloured(x, keep))[100:, 0]
     assert np.sqrt(np.mean(bias**2)) < 1.2  # a constant offset counts no more than with white noise of unit variance

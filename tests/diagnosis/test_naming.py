@@ -49,19 +49,51 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
-def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch):
+def held(monkeypatch, misfit, whole, explored, named, described=()):
+    """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
+    units = {
+        "load_spring": unit("load_spring", "torque"), "~order": unit("~order", "torque", kind="form"),
+        "remainder:torque": unit("remainder:torque", "torque", kind="remainder"),
+    }  # fmt: skip
     everything = SimpleNamespace(
-        models=[model(0.0, "load_spring"), model(-50.0)],
+        models=whole,
         search=SimpleNamespace(
-            fit=lambda members: model(-50.0, *(u for u, _ in members)), candidates={("remainder:torque", 0): None}
+            fit=lambda members: model(-50.0, *(u for u, _ in members)),
+            candidates={("remainder:torque", 0): None}, units=units,
         ),
-    )
-    search = SimpleNamespace(fit=lambda members: model(-2.0))
-    explored = SimpleNamespace(models=[model(0.0, "load_spring"), model(-2.0)], search=search)
-    misfit = {("load_spring",): 130.0, (): 100.0}
+    )  # fmt: skip
+    search = SimpleNamespace(fit=lambda members: model(-2.0, *(u for u, _ in members)), units=units)
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
-    kept, ratios = held_out.held_to_account(everything, ["load_spring"], None, None, explored)
+    return held_out.held_to_account(
+        everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
+        SimpleNamespace(models=explored, search=search),
+    )  # fmt: skip
+
+
+def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch):
+    misfit = {("load_spring",): 130.0, (): 100.0}
+    whole = [model(0.0, "load_spring"), model(-50.0)]
+    explored = [model(0.0, "load_spring"), model(-2.0)]
+    kept, ratios = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": -15.0} and kept[0].units == ("remainder:torque",)
     misfit["load_spring",] = 80.0
-    kept, ratios = held_out.held_to_account(everything, ["load_spring"], None, None, explored)
+    kept, ratios = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": 10.0} and kept[0].units == ("load_spring",)
+
+
+@pytest.mark.parametrize(("after", "told"), [(99.0, False), (80.0, True)])
+def test_a_described_form_is_told_where_the_held_out_part_confirms_it(monkeypatch, after, told):
+    misfit = {("~order",): after, (): 100.0}
+    whole = [model(0.0, "~order"), model(-50.0)]
+    kept, ratios = held(monkeypatch, misfit, whole, [model(0.0, "~order"), model(-2.0)], [], ["~order"])
+    assert ratios["~order"] == 0.5 * (100.0 - after)
+    assert ("~order" in kept[0].units) == told
+    if not told:
+        assert all("~order" not in m.units for m in kept)
+
+
+def test_what_is_named_in_place_of_a_name_is_held_to_account_as_well(monkeypatch):
+    misfit = {("load_spring",): 130.0, (): 100.0}
+    whole = [model(0.0, "load_spring"), model(-50.0)]
+    _, ratios = held(monkeypatch, misfit, whole, [model(0.0, "load_spring"), model(-2.0)], [])
+    assert ratios == {"load_spring": -15.0}

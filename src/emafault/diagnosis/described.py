@@ -8,12 +8,14 @@ import numpy as np
 from .forms import FORMS
 from .left import Left, gain
 from .linearisation import SETTINGS
-from .model import Block, Parameter, Unit, Variant
+from .model import WORDS, Block, Parameter, Unit, Variant
+from .search import FORM_PRIOR
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
 REFINED = 3  # rounds over the parameters of a shape
 STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
+PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
 SAME = 4.0  # standard deviations
 SPAN = 3.0  # widest prior of a coefficient over the noise of a row
 
@@ -129,7 +131,9 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
                 continue
             name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
             fine = form.fine(left, driver, shape)
-            value, best = max(((f.evidence - float(np.log(f.among * places)), f) for f in fine), key=lambda x: x[0])
+            value, best = max(
+                ((f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in fine), key=lambda x: x[0]
+            )
             if value > 0.0:
                 among = best.among * places
                 found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))

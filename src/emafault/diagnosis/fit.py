@@ -57,7 +57,7 @@ class Bench(NormalEquations):
     """A bench with the search over its sets."""
 
     searching: type[Search] = Search
-    describing = True  # whether what is left is looked through for forms
+    describing = True  # whether recordings are long enough to tell forms and the colour of the noise from each other
     settled = SETTLED
 
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
@@ -79,7 +79,7 @@ class Bench(NormalEquations):
             if self._describe("first"):
                 whites, normal = self._renewed()
             self.reach = self.reaches[1]
-            if self._begun_at_single(normal):
+            if self.describing and self._begun_at_single(normal):
                 whites, normal = self._renewed()
             # what no one has described comes last: it would take up what only a better point explains
             whites, normal, search = self._until_still(whites, normal, FIRST, False)
@@ -103,7 +103,26 @@ class Bench(NormalEquations):
                 break
             whites, normal = self._renewed()
             whites, normal, search = self._until_still(whites, normal, ROUNDS)
+        if self.describing:
+            whites, normal, search = self._by_what_leads(whites, normal, search)
         return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
+
+    def _by_what_leads(self, whites: list[White], normal: Normal, search: Search) -> tuple[list[White], Normal, Search]:
+        """Search once more with the noise that the leading set leaves, until it leads by that too.
+
+        A full model takes from the noise whatever any cause could explain: right while causes are compared that one of
+        them may be, too little noise once none of them is it.
+        """
+        for _ in range(ROUNDS):
+            best = search.ranked()[0]
+            self.settle(best, normal)
+            found, _ = self._fitted(best)
+            whites = self.linearise(renew=True, leading=found)
+            normal = self.normal(whites)
+            search = self._search(normal)
+            if search.ranked()[0].units == best.units:
+                break
+        return whites, normal, search
 
     @property
     def described(self) -> tuple[Described, ...]:

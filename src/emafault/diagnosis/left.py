@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .evidence import Definite
-from .linear import Weights
 from .model import Block
-from .whitening import factored, substituted, substituted_back
+from .whitening import Weights, factored, substituted, substituted_back
 
 Shape = Mapping[str, float]
 Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
@@ -100,7 +99,7 @@ class Left:
 def gain(g: np.ndarray, G: np.ndarray) -> float:
     """Approximate log Bayes factor of columns with score ``g`` and information ``G``, at the best width of their prior.
 
-    With a prior as wide as what is found, r columns lose r/2 ln(1 + 2 L / r) of the gain L in log likelihood.
+    With a prior as wide as what is found, r columns lose r/2 (1 + ln(2 L / r)) of the gain L in log likelihood.
     """
     scale = np.sqrt(np.maximum(np.diag(G), 0.0))
     used = scale > 1e-9 * max(scale.max(initial=0.0), 1e-300)
@@ -109,8 +108,12 @@ def gain(g: np.ndarray, G: np.ndarray) -> float:
     unit = g[used] / scale[used]
     M = G[np.ix_(used, used)] / np.outer(scale[used], scale[used])
     found = float(0.5 * unit @ Definite(M + 1e-6 * np.eye(len(M))).solve(unit))
-    count = int(used.sum())
-    return found - 0.5 * count * float(np.log1p(2.0 * max(found, 0.0) / count))
+    return float(_less_width(np.array([found]), int(used.sum()))[0])
+
+
+def _less_width(found: np.ndarray, count: int) -> np.ndarray:
+    share = np.maximum(2.0 * found / count, 1.0)
+    return np.maximum(found, 0.5 * count) - 0.5 * count * (1.0 + np.log(share))
 
 
 def singly(g: np.ndarray, G: np.ndarray) -> np.ndarray:
@@ -118,7 +121,7 @@ def singly(g: np.ndarray, G: np.ndarray) -> np.ndarray:
     power = np.diag(G)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.where(power > 1e-12 * max(power.max(initial=0.0), 1e-300), 0.5 * g**2 / power, 0.0)
-    return found - 0.5 * np.log1p(2.0 * found)
+    return _less_width(found, 1)
 
 
 def of_cells(columns: np.ndarray, g: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,24 +7,14 @@ import numpy as np
 
 from .evidence import Definite, Normal, factored
 from .model import Block
-from .whitening import OUTLIER, autoregression, filtered, local_variance, products, whiten
+from .whitening import OUTLIER, Weights, coloured, filtered, products, whiten
 
 OWN = slice(0, 14)  # functions of an own form; the first is constant, for it may differ between equations
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 FEW = 30  # rows
-LOCAL = 150  # rows whose variance is estimated together
 ROUNDING = 1e-10  # of a unit diagonal
-
-
-@dataclass
-class Weights:
-    """What a full model's residual says of a block's noise: rows to leave out, autoregression, variance (row,)."""
-
-    usable: np.ndarray
-    coefficients: np.ndarray
-    variance: np.ndarray
 
 
 @dataclass
@@ -121,12 +111,12 @@ def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weight
 def compressed_columns(block: Block, names: list[str], columns: Sequence, weights: Weights | None) -> White:
     """The same of raw columns, without all of their white rows in memory at once."""
     w = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
-    gram = products(block.bands, block.usable, columns, w.usable, w.coefficients, w.variance)
+    gram = products(block.bands, block.usable, columns, w)
     return White(block.recording, block.equation, names, gram, int(w.usable.sum()))
 
 
 def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
-    return rows if weights is None else filtered(rows, weights.usable, weights.coefficients, weights.variance)
+    return rows if weights is None else filtered(rows, weights)
 
 
 def correct(
@@ -259,8 +249,4 @@ def weights_from(block: Block, names: Sequence[str], columns: Sequence, deviatio
         keep = usable
     if keep.sum() < FEW:  # no spectrum: the noise as stated, or more
         return Weights(keep, np.zeros(0), np.full(len(keep), max(float(np.mean(left[keep] ** 2)), 1.0)))
-    coefficients, variance = autoregression(np.where(keep, left, 0.0), keep)
-    new = filtered(left[:, None], keep, coefficients, np.full(len(keep), max(variance, 1e-6)))[:, 0]
-    local = local_variance(new, keep, LOCAL)
-    settled = float(np.mean(new[keep] ** 2 / local[keep]))
-    return Weights(keep, coefficients, max(variance, 1e-6) * settled * local)
+    return coloured(np.where(keep, left, 0.0), keep)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .linear import Weights, White, compressed_columns, correct, raw_columns, weights_from
+from .linear import White, compressed_columns, correct, raw_columns, weights_from
 from .model import Block
+from .whitening import Weights
 
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 KEPT = 2e8  # bytes of columns that a process keeps from a pass to the one that renews the weights

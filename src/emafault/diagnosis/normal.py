@@ -35,18 +35,31 @@ class NormalEquations(Point):
         self.remainders: dict[str, Unit] = {}
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
 
-    def linearise(self, model: Model | None = None, renew: bool = False, corrected: bool = True) -> list[White]:
+    def linearise(
+        self, model: Model | None = None, renew: bool = False, corrected: bool = True, leading: Model | None = None
+    ) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
-        ``renew`` takes the weights from what a full model leaves there.
+        ``renew`` takes the weights from what a full model leaves there, or from what a ``leading`` one does.
         ``corrected`` takes out what the noise in the regressors adds.
         """
         task = self._task(model, corrected)
         if not renew:
             return self._each(task, self.recordings)
         whites = self._each(replace(task, again=True, corrected=False), self.recordings)
-        full = full_model(whites, self._full_prior(*self._columns_of(model)))
+        if leading is None:
+            full = full_model(whites, self._full_prior(*self._columns_of(model)))
+        else:
+            full = self._own_deviations(leading, self.normal(whites, model))
         return self._each(replace(task, full=full), self.recordings)
+
+    def _own_deviations(self, model: Model, normal: Normal) -> dict[str, float]:
+        """Deviations of columns from the present point in a model, the nuisances fitted beside it."""
+        out = self.nuisance_deviations(normal, model.deviations)
+        for n, d in model.deviations.items():
+            own = self.parameters[n].alias or n if is_parameter(n) else n
+            out[own] = out.get(own, 0.0) + d
+        return out
 
     def _task(self, model: Model | None, corrected: bool) -> Task:
         """What is to be linearised at the present point: every column and remainder, or those that a model has."""

@@ -1,6 +1,7 @@
 """Rows of a block made white: by the noise's banded covariance, then by what a full model leaves."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -13,6 +14,8 @@ ORDER = 12  # largest order of the autoregressive model of what is left
 LAGS = 48  # of its spectrum's estimate
 TILE = 1500  # rows that are whitened together
 GRID = 128  # frequencies at which it is looked at
+WANDERING = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)  # shares of an innovation that a slow level may follow by
+LOCAL = 150  # rows whose variance is estimated together
 
 
 @compiled
@@ -56,31 +59,41 @@ def substituted(lower, usable, rows):
 
 
 @compiled
-def _filter(rows, keep, coefficients, scale):
-    """The autoregressive filter; rows left out count as zero before it and after it."""
+def _filter(rows, keep, wander, coefficients, scale):
+    """The slow level that wanders taken off, then the autoregressive filter; rows left out count as zero in the latter
+    before and after, and leave the level as it is."""
     n, m = rows.shape
     out = np.zeros((n, m))
+    level = np.zeros(m)
+    lags = len(coefficients) + 1
+    memory = np.zeros((lags, m))
     for k in range(n):
+        last = k % lags
         if not keep[k]:
+            for q in range(m):
+                memory[last, q] = 0.0
             continue
+        share = max(wander, 1.0 / (k + 1.0)) if wander > 0.0 else 0.0
         for q in range(m):
-            out[k, q] = rows[k, q]
+            memory[last, q] = rows[k, q] - level[q]
+            level[q] += share * memory[last, q]
+            out[k, q] = memory[last, q]
         for p in range(min(len(coefficients), k)):
             if keep[k - 1 - p]:
-                f = coefficients[p]
+                f, other = coefficients[p], (k - 1 - p) % lags
                 for q in range(m):
-                    out[k, q] -= f * rows[k - 1 - p, q]
+                    out[k, q] -= f * memory[other, q]
         for q in range(m):
             out[k, q] *= scale[k]
     return out
 
 
 @compiled
-def _white_tile(tile, lower, usable, start, before, memory, keep, coefficients, scale):
+def _white_tile(tile, lower, usable, start, before, memory, level, keep, wander, coefficients, scale):
     """(row, column) of a part of the rows, whitened and filtered; ``tile`` (column, row) are those from ``start`` on.
 
     ``before`` (band, column) and ``memory`` (lag, column) are rings of what factor and filter hold of earlier
-    rows, carried on.
+    rows, ``level`` (column,) what has wandered, carried on.
     """
     m, n = tile.shape
     width, lags = lower.shape[0], memory.shape[0]
@@ -98,10 +111,14 @@ def _white_tile(tile, lower, usable, start, before, memory, keep, coefficients, 
                     before[own, q] -= f * before[other, q]
         for q in range(m):
             before[own, q] *= a
-            memory[last, q] = before[own, q] if usable[k] else 0.0
         if not keep[k]:
+            for q in range(m):
+                memory[last, q] = 0.0
             continue
+        share = max(wander, 1.0 / (k + 1.0)) if wander > 0.0 else 0.0
         for q in range(m):
+            memory[last, q] = (before[own, q] if usable[k] else 0.0) - level[q]
+            level[q] += share * memory[last, q]
             out[r, q] = memory[last, q]
         for p in range(min(len(coefficients), k)):
             if keep[k - 1 - p]:
@@ -113,27 +130,38 @@ def _white_tile(tile, lower, usable, start, before, memory, keep, coefficients, 
     return out
 
 
-def products(
-    bands: list[np.ndarray],
-    usable: np.ndarray,
-    columns: Sequence,
-    keep: np.ndarray,
-    coefficients: np.ndarray,
-    variance: np.ndarray,
-) -> np.ndarray:
+@dataclass
+class Weights:
+    """What a full model's residual says of a block's noise: rows to leave out, how it wanders and is correlated, and
+    its variance (row,).
+
+    ``wander``: share of each innovation by which the noise's slow level follows it, of a local level model (Durbin and
+    Koopman 2012, Time Series Analysis by State Space Methods, section 2.2); 0: none.
+    """
+
+    usable: np.ndarray
+    coefficients: np.ndarray
+    variance: np.ndarray
+    wander: float = 0.0
+
+
+def products(bands: list[np.ndarray], usable: np.ndarray, columns: Sequence, weights: Weights) -> np.ndarray:
     """(column, column) products of columns, each (row,) or a scalar, whitened and filtered: part after part, so that
     they are never all in memory."""
     n, m = len(bands[0]), len(columns)
     lower = factored(bands, usable)
-    before, memory = np.zeros((len(bands), m)), np.zeros((len(coefficients) + 1, m))
-    out = np.zeros((m, m))
-    scale = 1.0 / np.sqrt(variance)
+    before, memory = np.zeros((len(bands), m)), np.zeros((len(weights.coefficients) + 1, m))
+    level, out = np.zeros(m), np.zeros((m, m))
+    scale = 1.0 / np.sqrt(weights.variance)
     for start in range(0, n, TILE):
         end = min(start + TILE, n)
         tile = np.empty((m, end - start))
         for k, c in enumerate(columns):
             tile[k] = c[start:end] if np.ndim(c) else c
-        rows = _white_tile(tile, lower, usable, start, before, memory, keep, np.asarray(coefficients, float), scale)
+        rows = _white_tile(
+            tile, lower, usable, start, before, memory, level, weights.usable, weights.wander, weights.coefficients,
+            scale,
+        )  # fmt: skip
         out += rows.T @ rows
     return out
 
@@ -169,10 +197,26 @@ def substituted_back(lower: np.ndarray, usable: np.ndarray, white: np.ndarray) -
     return np.where(usable, out, 0.0)
 
 
-def filtered(rows: np.ndarray, keep: np.ndarray, coefficients: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """(row, column) through the autoregressive model of what a full model leaves, its variance (row,) in each row; rows
-    not kept become zero."""
-    return _filter(rows, keep, np.asarray(coefficients, float), 1.0 / np.sqrt(variance))
+def filtered(rows: np.ndarray, weights: Weights) -> np.ndarray:
+    """(row, column) through the model of what a full model leaves; rows not kept become zero."""
+    return _filter(rows, weights.usable, weights.wander, weights.coefficients, 1.0 / np.sqrt(weights.variance))
+
+
+def coloured(white: np.ndarray, keep: np.ndarray) -> Weights:
+    """The model of what a full model leaves of white rows: how its level wanders, an autoregression, and variances."""
+    n = int(keep.sum())
+    best, chosen = np.inf, Weights(keep, np.zeros(0), np.ones(len(white)))
+    for wander in WANDERING:
+        trial = Weights(keep, np.zeros(0), np.ones(len(white)), wander)
+        left = filtered(white[:, None], trial)[:, 0]
+        coefficients, variance, score = autoregression(left, keep)
+        score += (wander > 0.0) * np.log(n)
+        if score < best:
+            best = score
+            chosen = replace(trial, coefficients=coefficients, variance=np.full(len(white), max(variance, 1e-6)))
+    new = filtered(white[:, None], chosen)[:, 0]
+    local = local_variance(new, keep, LOCAL)
+    return replace(chosen, variance=chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local)
 
 
 def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarray:
@@ -202,15 +246,15 @@ def _without_dips(r: np.ndarray) -> np.ndarray:
     return np.concatenate([[spectrum.mean()], spectrum @ cosine / GRID])
 
 
-def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
-    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
+def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, innovation variance, and BIC."""
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
     top = min(ORDER, n // 20)
     lags = min(LAGS, n // 4)
     r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(lags + 1)])
     if r[0] <= 0.0:
-        return np.zeros(0), 1.0
+        return np.zeros(0), 1.0, np.inf
     r = _without_dips(r)
     best, chosen, variance = n * np.log(r[0]), np.zeros(0), r[0]
     a, error = np.zeros(0), r[0]
@@ -221,4 +265,4 @@ def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float
         score = n * np.log(error) + order * np.log(n)
         if score < best:
             best, chosen, variance = score, a.copy(), error
-    return chosen, float(variance)
+    return chosen, float(variance), float(best)

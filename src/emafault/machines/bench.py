@@ -51,7 +51,7 @@ class MeasuredBench(Bench):
     reaches = (np.inf, np.inf)  # priors are as wide as the signals allow
     settled = SETTLED
 
-    def linearise(self, model=None, renew=False, corrected=True):
+    def linearise(self, model=None, renew=False, corrected=True, leading=None):
         """See ``Bench``; there are no weights to renew, and what the equations read is taken as exact."""
         return self._each(self._task(model, corrected=False), self.recordings)
 

@@ -1,0 +1,131 @@
+"""Described forms: each is found where it is, none where there is none, and found forms are columns like any other."""
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.described import Described, WithForms, proposed, refined
+from emafault.diagnosis.forms import FORMS
+from emafault.diagnosis.model import Block
+from emafault.diagnosis.whitening import Weights, coloured, filtered
+
+H, SIZE, NAMES = 2e-4, 4000, ("one", "two", "three")
+
+
+def coordinates(number):
+    """Of a recording that turns to and fro at its own rate."""
+    time = (np.arange(SIZE) + 0.5) * H
+    speed = 150.0 * np.sin(2.0 * np.pi * (1.5 + 0.3 * number) * time + number)
+    angle = np.cumsum(speed) * H + number
+    current = 4.0 + 2.0 * np.cos(2.0 * np.pi * 3.0 * time + number)
+    return {
+        "time": time, "rotor_speed": speed, "angle": angle, "rotor_angle": np.mod(angle, 2.0 * np.pi),
+        "current": current, "output_angle": angle / 100.0, "temperature": np.full(SIZE, 20.0 + number),
+        "drivers": np.array([np.ones(SIZE), np.sign(speed)]), "direction": np.sign(speed),
+    }  # fmt: skip
+
+
+class Machine:
+    """One equation with white noise and a form in it, or none."""
+
+    recordings, units, parameters = NAMES, (), {}
+
+    def __init__(self, word=None, shape=None, sizes=(), driver=0):
+        self.found, drivers = [], []
+        for number, name in enumerate(NAMES):
+            rng = np.random.default_rng(number)
+            along = coordinates(number)
+            left = rng.standard_normal(SIZE)
+            if word is not None:
+                # a form of each recording's own has its coefficients another way round in the next
+                own = np.roll(sizes, number) if FORMS[word].EACH else np.asarray(sizes)
+                left = left + own @ FORMS[word].columns(along, shape) * along["drivers"][driver]
+            usable = np.ones(SIZE, bool)
+            drivers.append(along["drivers"])
+            self.found.append(Block(name, "torque", left, {}, [np.ones(SIZE)], usable, along))
+        # drivers have coefficients of their own, which have been fitted
+        X, y = np.hstack(drivers).T, np.concatenate([b.residual for b in self.found])
+        fitted = np.split(X @ np.linalg.lstsq(X, y, rcond=None)[0], len(NAMES))
+        for b, part in zip(self.found, fitted, strict=True):
+            b.residual = b.residual - part
+        self.carried = {n: {"torque": Weights(np.ones(SIZE, bool), np.zeros(0), np.ones(SIZE))} for n in NAMES}
+
+    def channels(self, equation):
+        return ()
+
+    def blocks(self, values, name, disturbed=False, wanted=None):
+        b = self.found[NAMES.index(name)]
+        return [Block(b.recording, b.equation, b.residual.copy(), {}, b.bands, b.usable, b.coordinates)]
+
+    def proposed(self):
+        return proposed(self, self.found, self.carried, "x")
+
+
+CASES = [
+    ("order", {"order": 3.27}, (0.15, 0.1), 0),
+    ("order", {"order": 2.0}, (0.15, 0.1), 1),
+    ("frequency", {"frequency": 41.7}, (0.2, 0.1), 0),
+    ("bump", {"centre": 2.1, "width": 0.25}, (0.4,), 0),
+    ("step_change", {"time": 0.31}, (0.5,), 1),
+    ("function", {"coordinate": 0.0, "from": -150.0, "to": 150.0}, (0.3, -0.2, 0.1, 0.1, -0.2, 0.3), 0),
+    ("memory", {"source": 0.0, "time_constant": 0.12}, (0.05,), 1),
+]
+
+
+@pytest.mark.parametrize(("word", "shape", "sizes", "driver"), CASES, ids=[f"{c[0]}{c[3]}" for c in CASES])
+def test_a_form_is_found_where_it_is(word, shape, sizes, driver):
+    machine = Machine(word, shape, sizes, driver)
+    first = machine.proposed()[0]
+    first = refined(first, machine.found, machine.carried, {})
+    assert first.word == word
+    assert first.driver == driver or word == "function"  # of the speed, its sign makes another one
+    for name, value, deviation, _ in first.shape:
+        if word != "function":
+            assert abs(value - shape[name]) < 5.0 * max(deviation, 1e-9) + 0.02 * abs(shape[name]), name
+    if word == "order" and shape["order"] == 2.0:
+        assert first.values["order"] == 2.0  # what turns with the rotor
+
+
+def test_noise_alone_has_no_form():
+    assert Machine().proposed() == []
+
+
+def test_a_found_form_is_taken_out_by_its_coefficients():
+    machine = Machine("order", {"order": 3.27}, (0.5, 0.2))
+    form = Described("~order", "order", "torque", 0, (("order", 3.27, 0.01, "1"),), 1.0, 100.0)
+    both = WithForms(machine, [form])
+    names = form.names("one")
+    assert [p.name for p in both.units[0].parameters] == names and both.units[0].among == 100.0
+    at = dict(zip(names, (0.5, 0.2), strict=True))
+    before, after = both.blocks({}, "one")[0], both.blocks(at, "one")[0]
+    assert np.var(after.residual) < 0.95 * np.var(before.residual)
+    step = 1e-3
+    more = both.blocks({**at, names[0]: at[names[0]] + step}, "one")[0]
+    assert np.allclose((more.residual - after.residual) / step, after.columns[names[0]])
+    assert both.blocks({}, "one", wanted=())[0].columns == {}
+
+
+def test_a_form_of_each_recording_has_coefficients_of_each():
+    form = Described("~f", "frequency", "torque", 0, (("frequency", 40.0, 0.1, "Hz"),), 1.0, 100.0)
+    names = [p.name for p in form.unit(NAMES).parameters]
+    assert len(names) == 6 and names[0].endswith("@one") and names[-1].endswith("@three")
+
+
+def test_what_comes_and_goes_counts_less():
+    rng = np.random.default_rng(4)
+    white = rng.standard_normal(6000)
+    white[2000:2600] *= 8.0
+    keep = np.ones(len(white), bool)
+    weights = coloured(white, keep)
+    assert np.median(weights.variance[2100:2500]) > 20.0 * np.median(weights.variance[4000:])
+    assert np.mean(filtered(white[:, None], weights) ** 2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_level_that_wanders_does_not_look_like_a_constant():
+    rng = np.random.default_rng(5)
+    keep = np.ones(8000, bool)
+    white = rng.standard_normal(8000) + np.cumsum(0.1 * rng.standard_normal(8000))
+    weights = coloured(white, keep)
+    assert weights.wander > 0.0
+    constant = filtered(np.ones((8000, 1)), weights)[:, 0]
+    assert constant @ constant < 200.0  # white noise would have 8000
+    assert coloured(rng.standard_normal(8000), keep).wander == 0.0
