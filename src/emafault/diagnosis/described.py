@@ -31,7 +31,7 @@ class Described:
     shape: tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation, unit
     scale: float  # of its coefficients
     among: float  # alternatives that the scan could have told from it
-    channel: str = ""  # of the measuring chain, where it lies in the recorded signal and not in the equation
+    channel: str = ""  # of the measuring chain, or a coefficient: what several equations have it through
 
     @property
     def values(self) -> dict[str, float]:
@@ -98,8 +98,8 @@ class WithForms:
                             self._columns[block.recording, equation, form.id, form.shape] = rows
                     else:
                         self._columns[key] = form.columns(block)
-                columns = self._columns[key]
-                if not columns.any():
+                columns = self._columns.get(key)
+                if columns is None or not columns.any():
                     continue
                 block.residual = block.residual + here @ columns
                 block.columns |= dict(zip(names, columns, strict=True))
@@ -139,19 +139,21 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
                 found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
     found.sort(key=lambda x: -x[0])
     out = [d for _, d in found][:PROPOSED]
-    return [*out, *(c for d in out[:CHANNELED] if d.driver == 0 for c in _in_channels(machine, d))]
+    return [*out, *(c for d in out[:CHANNELED] for c in _elsewhere(machine, d))]
 
 
-def _in_channels(machine, form: Described) -> list[Described]:
-    """The same form in the channels of the measuring chain that the equation sees."""
-    names = [c for c in machine.channels(form.equation) if c.split("_")[0] in FORMS[form.word].CHANNELS]
+def _elsewhere(machine, form: Described) -> list[Described]:
+    """The same shape where it acts in several equations: a channel of the measuring chain, or a coefficient that they
+    share."""
+    if form.driver == 0:
+        names = [c for c in machine.channels(form.equation) if c.split("_")[0] in FORMS[form.word].CHANNELS]
+    else:
+        names = machine.coefficients(form.equation, form.driver) if not FORMS[form.word].EACH else []
     out = []
-    for channel in names:
-        equation, noise = machine.channel(channel)
-        name = f"{form.id}_{channel}"
-        out.append(
-            replace(form, id=name, equation=equation, channel=channel, scale=noise, among=form.among * len(names))
-        )
+    for place in names:
+        equation, scale = machine.place(place, form.equation)
+        name = f"{form.id}_{place}"
+        out.append(replace(form, id=name, equation=equation, channel=place, scale=scale, among=form.among * len(names)))
     return out
 
 

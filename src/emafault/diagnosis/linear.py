@@ -230,10 +230,13 @@ def full_model(whites: Sequence[White], prior: Mapping[str, tuple[float, float]]
     return dict(zip(names, d.tolist(), strict=True))
 
 
-def weights_from(block: Block, names: Sequence[str], columns: Sequence, deviations: Mapping[str, float]) -> Weights:
+def weights_from(
+    block: Block, names: Sequence[str], columns: Sequence, deviations: Mapping[str, float], leads: bool = False
+) -> Weights:
     """Weights of a block from what a full model's deviations leave of its rows; common to all hypotheses.
 
-    ``columns`` as ``raw_columns`` has them.
+    ``columns`` as ``raw_columns`` has them. Of the set that ``leads``, at its own optimum, what is left may wander or
+    come and go; of a linear model far from its optimum it is not known to be noise.
     """
     usable = block.usable
     if not usable.any():
@@ -249,4 +252,4 @@ def weights_from(block: Block, names: Sequence[str], columns: Sequence, deviatio
         keep = usable
     if keep.sum() < FEW:  # no spectrum: the noise as stated, or more
         return Weights(keep, np.zeros(0), np.full(len(keep), max(float(np.mean(left[keep] ** 2)), 1.0)))
-    return coloured(np.where(keep, left, 0.0), keep)
+    return coloured(np.where(keep, left, 0.0), keep, leads)

@@ -27,6 +27,7 @@ class Task:
     remainders: frozenset[str] | None = None
     own: Mapping[str, Mapping[str, float]] | None = None
     full: Mapping[str, float] | None = None
+    leads: bool = False
     again: bool = False
     corrected: bool = True
 
@@ -54,7 +55,7 @@ class Linearisation:
                 task.own if b.equation not in SETTINGS else None,
             )  # fmt: skip
             if task.full is not None:
-                renewed[b.equation] = weights_from(b, names, columns, task.full)
+                renewed[b.equation] = weights_from(b, names, columns, task.full, task.leads)
             weight = weights.get(b.equation) if task.full is None else renewed[b.equation]
             out.append(compressed_columns(b, names, columns, weight))
         if task.full is not None:

@@ -51,7 +51,7 @@ class NormalEquations(Point):
             full = full_model(whites, self._full_prior(*self._columns_of(model)))
         else:
             full = self._own_deviations(leading, self.normal(whites, model))
-        return self._each(replace(task, full=full), self.recordings)
+        return self._each(replace(task, full=full, leads=leading is not None), self.recordings)
 
     def _own_deviations(self, model: Model, normal: Normal) -> dict[str, float]:
         """Deviations of columns from the present point in a model, the nuisances fitted beside it."""

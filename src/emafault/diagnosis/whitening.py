@@ -15,6 +15,7 @@ LAGS = 48  # of its spectrum's estimate
 TILE = 1500  # rows that are whitened together
 GRID = 128  # frequencies at which it is looked at
 WANDERING = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)  # shares of an innovation that a slow level may follow by
+QUIETEST = 0.05  # of the mean variance, that most rows may have
 LOCAL = 150  # rows whose variance is estimated together
 
 
@@ -202,11 +203,12 @@ def filtered(rows: np.ndarray, weights: Weights) -> np.ndarray:
     return _filter(rows, weights.usable, weights.wander, weights.coefficients, 1.0 / np.sqrt(weights.variance))
 
 
-def coloured(white: np.ndarray, keep: np.ndarray) -> Weights:
-    """The model of what a full model leaves of white rows: how its level wanders, an autoregression, and variances."""
+def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True) -> Weights:
+    """The model of what is left of white rows: an autoregression and its variance; where it may be ``changing``, how
+    its level wanders and how its variance comes and goes as well."""
     n = int(keep.sum())
     best, chosen = np.inf, Weights(keep, np.zeros(0), np.ones(len(white)))
-    for wander in WANDERING:
+    for wander in WANDERING if changing else (0.0,):
         trial = Weights(keep, np.zeros(0), np.ones(len(white)), wander)
         left = filtered(white[:, None], trial)[:, 0]
         coefficients, variance, score = autoregression(left, keep)
@@ -214,9 +216,12 @@ def coloured(white: np.ndarray, keep: np.ndarray) -> Weights:
         if score < best:
             best = score
             chosen = replace(trial, coefficients=coefficients, variance=np.full(len(white), max(variance, 1e-6)))
+    if not changing:
+        return chosen
     new = filtered(white[:, None], chosen)[:, 0]
     local = local_variance(new, keep, LOCAL)
-    return replace(chosen, variance=chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local)
+    variance = chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local
+    return replace(chosen, variance=np.maximum(variance, 1e-6))
 
 
 def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarray:
@@ -229,7 +234,9 @@ def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarra
     power = uniform_filter1d(np.where(keep, white**2, 0.0), width, mode="nearest")
     share = uniform_filter1d(keep.astype(float), width, mode="nearest")
     local = power / np.maximum(share, 1.0 / width)
-    return np.maximum(local / max(float(np.median(local[keep])), 1e-300), 1.0)
+    # where a converter's steps are coarse most rows may leave nothing at all
+    most = max(float(np.median(local[keep])), QUIETEST * float(np.mean(local[keep])))
+    return np.maximum(local / max(most, 1e-300), 1.0)
 
 
 def _without_dips(r: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from ..diagnosis.linearisation import SETTINGS
 from ..diagnosis.model import Block, Parameter, Unit, Variant
 from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
-from .dual import Dual
+from .dual import Dual, value_of
 from .point import Point, State
 from .signals import REST, Signals
 from .terms import TERMS
@@ -37,6 +37,8 @@ CHANNELS = {
     "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
     "electrical_b": ("current_b",), "electrical_c": ("current_c",),
 }  # fmt: skip
+BACK_EMF = 2  # driver of the electrical equations: speed times the shape
+K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 
@@ -213,25 +215,44 @@ class ReferenceActuator:
         """Channels in which a form that shows in an equation may lie, rather than in the equation itself."""
         return CHANNELS.get(equation, ())
 
-    def channel(self, channel: str) -> tuple[str, float]:
-        """Equation that a channel's faults are told in, and the noise of its samples."""
-        quantity = channel.split("_")[0]
-        noise = next(iter(self.recordings.values())).noise
-        return f"sensor_{quantity}" if quantity != "output" else "position", float(
-            getattr(noise, {"output": "position"}.get(quantity, quantity))
-        )
+    def coefficients(self, equation: str, driver: int) -> tuple[str, ...]:
+        """Coefficients of other equations as well that a driver of an equation has."""
+        return (f"k_{equation[-1]}",) if equation in electrical.NAMES and driver == BACK_EMF else ()
 
-    def seen_in(self, channel: str, name: str, x: np.ndarray) -> dict[str, np.ndarray]:
-        """By equation (column, row): what signals x (column, sample) on a channel take out of the residuals, each."""
+    def place(self, place: str, equation: str) -> tuple[str, float]:
+        """Equation that a form in a channel or a coefficient is told in, and the scale of its size."""
+        quantity = place.split("_")[0]
+        if quantity == "k":
+            return equation, K_SCALE
+        noise = next(iter(self.recordings.values())).noise
+        name = {"output": "position"}.get(quantity, quantity)
+        return "position" if quantity == "output" else f"sensor_{quantity}", float(getattr(noise, name))
+
+    def seen_in(self, place: str, name: str, x: np.ndarray) -> dict[str, np.ndarray]:
+        """By equation (column, row): what signals x (column, sample) on a channel, or relative changes x of a
+        coefficient, take out of the residuals, each."""
         rec = self.recordings[name]
         off = {n: p.off for n, p in self.parameters.items()}
+        if place.startswith("k_"):
+            return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
         before = self._recording(off, rec, ())
-        step = self.channel(channel)[1]
+        step = self.place(place, "")[1]
         found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}
         for row in x:
-            for b, at in zip(before, self._recording(off, rec.less(channel, step * row), ()), strict=True):
+            for b, at in zip(before, self._recording(off, rec.less(place, step * row), ()), strict=True):
                 found[b.equation].append((at.residual - b.residual) / step)
         return {e: np.array(rows) for e, rows in found.items()}
+
+    def _back_emf(self, state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
+        """The same of a relative change of phase j's back-EMF coefficient: in its voltage and in the torque."""
+        rec, k = state.rec, float(value_of(state.k[j]))
+        voltage = -x * k * np.asarray(state.regressor[j].value)
+        if rec.current_end is None:
+            of = electrical.averaging(state, j)
+            voltage = np.array([of(v) for v in voltage])
+        drive = k * np.asarray(state.conducting[j].value) * np.asarray(state.current[j].value)
+        force = np.array([torque.two_intervals(-row * drive) for row in x])
+        return {electrical.NAMES[j]: voltage, "torque": force}
 
     def sampled(self, name: str) -> dict[str, Any]:
         """What the samples of a recording lie along."""

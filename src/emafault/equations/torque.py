@@ -44,10 +44,10 @@ def residual(state: State) -> Dual:
     theta = rec.angle
     second = np.zeros(rec.size)
     second[1:-1] = (theta[2:] - 2.0 * theta[1:-1] + theta[:-2]) / rec.interval**2
-    return a.inertia * second - balance.linear(_two_intervals, rec.size)
+    return a.inertia * second - balance.linear(two_intervals, rec.size)
 
 
-def _two_intervals(x: np.ndarray) -> np.ndarray:
+def two_intervals(x: np.ndarray) -> np.ndarray:
     """Mean over an interval and the next, at the angle sample between them."""
     out = np.array(x, copy=True)
     out[:-1] = 0.5 * (x[:-1] + x[1:])

@@ -1,8 +1,9 @@
-"""A function of one coordinate, piecewise linear between six knots."""
+"""A function of one coordinate: a cubic spline through six knots, constant beyond them."""
 
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ..left import Found, Left, Shape, gain, of_cells, without
 from ..model import Block
@@ -19,13 +20,14 @@ FEWEST = 3  # temperatures that show a function of it
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(knot, row) hats."""
+    """(knot, row) splines that are one at their knot and zero at the others."""
     along = tuple(COORDINATES)[int(shape["coordinate"])]
-    return _hats(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
+    return _splines(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
 
 
-def _hats(x, knots: np.ndarray) -> np.ndarray:
-    return np.array([np.interp(x, knots, row) for row in np.eye(len(knots))])
+def _splines(x, knots: np.ndarray) -> np.ndarray:
+    of = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
+    return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
@@ -45,8 +47,8 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
             return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
 
         cells = left.cells(cell, CELLS, driver)
-        hats = _hats(low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
-        value = gain(*of_cells(hats, *cells))
+        splines = _splines(low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
+        value = gain(*of_cells(splines, *cells))
         if best is None or value > best[1]:
             best = shape, value
     return best
