@@ -11,10 +11,8 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
-from ..diagnosis.described import Described
 from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit
-from ..diagnosis.forms import FORMS
 from ..diagnosis.linear import White
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
@@ -24,17 +22,16 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
-from . import electrical
+from . import electrical, telling
 from .held_out import held_to_account
 from .machine import FAULTS, ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import told
 from .signals import Signals, estimated_noise
+from .telling import EQUATION, Z
 from .terms import TERMS
 
 SCHEMA = "2.0"
-Z = 1.645  # standard deviations of a 90 % interval
-EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 FORM = {"~lag": "lag", "~crosstalk": "crosstalk", "~drift": "drift"}
 SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
@@ -173,7 +170,7 @@ def _diagnosed(
     verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
-    verdict["discovered"] = [*told(recordings), *_discovered(bench, reading, best)]
+    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best)]
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
@@ -293,26 +290,29 @@ def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
     return str(found[0]["equation"]) if found else "electrical"
 
 
-def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
+def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, model: Model) -> list[dict]:
     """Forms that no catalogue lists, and remainders, as the verdict tells them."""
     out = []
     described = {d.id: d for d in bench.described}
     for form in reading.forms:
         unit = next(u for u in bench.units if u.id == form)
-        parameters = {}
-        for n in model.deviations:
-            if any(n == p.name for p in unit.parameters):
-                p = bench.parameters[n]
-                value = bench.after({n: model.deviations[n]})[n]
-                sd = model.spread[n]
-                parameters[n] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": p.units}
+        linear = {
+            p.name: (bench.after({p.name: model.deviations[p.name]})[p.name], model.spread[p.name])
+            for p in unit.parameters
+            if p.name in model.deviations
+        }
         if form in described:
-            entry = told_of(described[form], parameters)
+            entry = telling.told(described[form], linear, machine.actuator)
         else:
             kind = next(v for k, v in FORM.items() if form.startswith(k))
             channel = form.split("_", 1)[1].replace("_", " of phase ")
+            units = {p.name: p.units for p in unit.parameters}
             entry = {
-                "equation": unit.equations[0], "along": "time", "form": kind, "parameters": parameters,
+                "equation": unit.equations[0], "along": "time", "form": kind,
+                "parameters": {
+                    n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]}
+                    for n, (v, sd) in linear.items()
+                },
                 "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
             }  # fmt: skip
         out.append(
@@ -333,28 +333,6 @@ def _discovered(bench: Bench, reading: Reading, model: Model) -> list[dict]:
             }
         )  # fmt: skip
     return out
-
-
-def told_of(form: Described, linear: Mapping[str, Mapping]) -> dict[str, Any]:
-    """A described form as the verdict tells it: where, along what, its parameters and a sentence."""
-    module = FORMS[form.word]
-    parameters: dict[str, dict] = {
-        n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units}
-        for n, v, sd, units in form.shape
-        if units
-    }
-    values = np.array([p["value"] for p in linear.values()])
-    half = np.array([0.5 * (p["high"] - p["low"]) for p in linear.values()])
-    for name, value in module.told(values).items():
-        width = float(np.sqrt(np.mean(half**2)))
-        parameters[name] = {"value": value, "low": value - width, "high": value + width, "units": ""}
-    shape = ", ".join(f"{n.replace('_', ' ')} {v:.4g} {u}".rstrip(" 1") for n, v, _, u in form.shape if u)
-    where = EQUATION.get(form.equation, form.equation)
-    along = module.ALONG if form.word != "function" else tuple(module.COORDINATES)[int(form.values["coordinate"])]
-    return {
-        "equation": where, "along": along, "form": form.word, "parameters": parameters,
-        "sentence": f"In the {where.replace('_', ' ')} equation: {form.word.replace('_', ' ')}, {shape}.",
-    }  # fmt: skip
 
 
 def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, float]) -> dict[str, dict]:

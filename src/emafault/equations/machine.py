@@ -37,6 +37,7 @@ CHANNELS = {
     "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
     "electrical_b": ("current_b",), "electrical_c": ("current_c",),
 }  # fmt: skip
+SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 BACK_EMF = 2  # driver of the electrical equations: speed times the shape
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
@@ -364,9 +365,10 @@ class ReferenceActuator:
         drivers = [np.broadcast_to(1.0, rec.size)]
         if equation.startswith("electrical"):
             j = "abc".index(equation[-1])
-            drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * 0.02]
+            drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
         elif equation == "torque":  # friction, torque constant, inertia
-            drivers += [rec.direction, _over_rms(state.drive), _over_rms(rec.acceleration)]
+            typical = typical_torque(rec.actuator)
+            drivers += [rec.direction, state.drive / typical, rec.acceleration * rec.actuator.inertia / typical]
         elif equation == "sensor_speed":
             drivers += [w]
         elif equation == "sensor_current":
@@ -405,8 +407,9 @@ class ReferenceActuator:
         }
 
 
-def _over_rms(x: np.ndarray) -> np.ndarray:
-    return x / max(float(np.sqrt(np.mean(x**2))), 1e-12)
+def typical_torque(actuator: ActuatorParameters) -> float:
+    """Torque of two phases at a tenth of the current limit (N m)."""
+    return 0.2 * actuator.back_emf * actuator.current_limit
 
 
 def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

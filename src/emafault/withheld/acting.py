@@ -102,7 +102,7 @@ def loosened_terminal(size: float, rng: np.random.Generator) -> Acting:
     return Acting((f"electrical_{phase}",), found, terms=lambda _, __: ([row], None))
 
 
-@ACTING.inside("coefficient", "rotor_angle", "order")
+@ACTING.inside("order", "rotor_angle", "order")
 def slip_ring(size: float, rng: np.random.Generator) -> Acting:
     """The resistance of one phase goes with the rotor angle."""
     (_, phase), amplitude = letter(rng), 0.1 * size

@@ -1,0 +1,115 @@
+"""Described forms in words and physical units: what a driver of an equation, a channel or a coefficient is."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.described import Described
+from ..diagnosis.forms import FORMS, function, memory
+from .machine import SWEPT, typical_torque
+
+EQUATION = {"commutation": "control"}  # of a block -> of the verdict
+Z = 1.645  # standard deviations of a 90 % interval
+WORDS = {"loss": "copper loss", "speed": "speed"}
+
+
+def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, float]:
+    """What has the form, its unit, and the factor from a coefficient to that unit."""
+    if form.channel.startswith("k_"):
+        return f"the back-EMF coefficient of phase {form.channel[-1]}, as a share of it,", "1", 1.0
+    if form.channel:
+        quantity, _, phase = form.channel.partition("_")
+        words = {"angle": "the recorded rotor angle", "output": "the recorded output position"}
+        units = {"angle": "rad", "output": "rad"}
+        return words.get(quantity, f"the recorded {quantity} of phase {phase}"), units.get(quantity, "A"), 1.0
+    torque = typical_torque(actuator)
+    if form.equation.startswith("electrical"):
+        phase = form.equation[-1]
+        return (
+            (f"a voltage of phase {phase}", "V", 1.0),
+            (f"the resistance of phase {phase}", "ohm", 1.0),
+            (f"the back-EMF coefficient of phase {phase}", "V s/rad", SWEPT),
+        )[form.driver]
+    known = {
+        "torque": (
+            ("a torque", "N m", 1.0), ("a drag against the motion", "N m", -1.0),
+            ("the torque constant, as a share of it,", "1", 1.0 / torque),
+            ("the inertia, as a share of it,", "1", -1.0 / torque),
+        ),
+        "sensor_speed": (("the recorded speed", "rad/s", 1.0), ("the scale of the recorded speed", "1", 0.01)),
+        "sensor_current": (
+            ("the sum of the recorded currents", "A", 1.0),
+            ("the gain of current a against c", "1", 1.0), ("the gain of current b against c", "1", 1.0),
+        ),
+        "position": (
+            ("the output position", "rad", 1.0), ("the play of the output position", "rad", 1.0),
+            ("the twist of the output by its acceleration", "rad s2", 1e-3),
+        ),
+        "bus": (("the bus voltage", "V", 1.0), ("the bus resistance", "ohm", 1.0)),
+    }  # fmt: skip
+    return known[form.equation][form.driver]
+
+
+def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: ActuatorParameters) -> dict[str, Any]:
+    """A described form as the verdict tells it: where, along what, its parameters with 90 % intervals and a sentence.
+
+    ``linear``: coefficients and their standard deviations by name.
+    """
+    module = FORMS[form.word]
+    what, units, factor = subject(form, actuator)
+    parameters: dict[str, dict] = {
+        n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": u} for n, v, sd, u in form.shape if u
+    }
+    values = factor * np.array([v for v, _ in linear.values()])
+    spread = abs(factor) * float(np.sqrt(np.mean([sd**2 for _, sd in linear.values()])))
+    for name, value in module.told(values).items():
+        angle = name == "phase"
+        width = Z * (spread / max(float(np.hypot(*values[:2])), 1e-12) if angle else spread)
+        parameters[name] = {
+            "value": value,
+            "low": value - width,
+            "high": value + width,
+            "units": "rad" if angle else units,
+        }
+    where = EQUATION.get(form.equation, form.equation)
+    along = module.ALONG
+    if form.word == "function":
+        along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
+    return {
+        "equation": where, "along": along,
+        "form": "coefficient" if form.word == "function" and form.driver else form.word, "parameters": parameters,
+        "sentence": _sentence(form, where, what, {n: (p["value"], p["units"]) for n, p in parameters.items()}, along),
+    }  # fmt: skip
+
+
+def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[float, str]], along: str) -> str:
+    def of(name: str) -> str:
+        value, units = found[name]
+        return f"{value:.3g}" if units == "1" else f"{value:.3g} {units}"
+
+    place = "In the measuring chain" if where.startswith("sensor") else f"In the {where.replace('_', ' ')} equation"
+    if form.word == "order":
+        says = f"{what} has a wave {of('order')} times per turn of the rotor, with an amplitude of {of('amplitude')}"
+    elif form.word == "frequency":
+        says = f"{what} oscillates at {of('frequency')} with an amplitude of {of('amplitude')}"
+    elif form.word == "bump":
+        size, units = found["depth"]
+        more = "higher" if size > 0 else "lower"
+        height = f"{abs(size):.3g}" + ("" if units == "1" else f" {units}")
+        says = f"{what} is {height} {more} about {of('centre')} of the turn, over {of('width')}"
+    elif form.word == "step_change":
+        says = f"{what} jumps by {of('jump')} at {of('time')}"
+    elif form.word == "memory":
+        source = WORDS[memory.SOURCES[int(form.values["source"])]]
+        says = f"{what} builds up with the {source}, with a time constant of {of('time_constant')}"
+    else:
+        knots = [found[n] for n in function.COEFFICIENTS]
+        low, high = min(v for v, _ in knots), max(v for v, _ in knots)
+        unit = "" if knots[0][1] == "1" else f" {knots[0][1]}"
+        says = (
+            f"{what} goes with the {along.replace('_', ' ')} from {of('from')} to {of('to')}, "
+            f"between {low:.3g} and {high:.3g}{unit}"
+        )
+    return f"{place}: {says}."
