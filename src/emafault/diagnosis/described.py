@@ -90,20 +90,24 @@ class WithForms:
                 here = np.array([values.get(n, 0.0) for n in names])
                 if not here.any() and wanted is not None and not set(names) & set(wanted):
                     continue
-                key = block.recording, block.equation, form.id, form.shape
-                if key not in self._columns:
-                    if form.channel:
-                        x = FORMS[form.word].columns(self.machine.sampled(name), form.values)
-                        for equation, rows in self.machine.seen_in(form.channel, name, x).items():
-                            self._columns[block.recording, equation, form.id, form.shape] = rows
-                    else:
-                        self._columns[key] = form.columns(block)
-                columns = self._columns.get(key)
+                columns = self.columns(form, block)
                 if columns is None or not columns.any():
                     continue
                 block.residual = block.residual + here @ columns
                 block.columns |= dict(zip(names, columns, strict=True))
         return blocks
+
+    def columns(self, form: Described, block: Block) -> np.ndarray | None:
+        """(column, row) of a form in a block; None where it does not act there."""
+        key = block.recording, block.equation, form.id, form.shape
+        if key not in self._columns:
+            if form.channel:
+                x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
+                for equation, rows in self.machine.seen_in(form.channel, block.recording, x).items():
+                    self._columns[block.recording, equation, form.id, form.shape] = rows
+            else:
+                self._columns[key] = form.columns(block)
+        return self._columns.get(key)
 
 
 def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], mark: str) -> list[Described]:
@@ -157,20 +161,22 @@ def _elsewhere(machine, form: Described) -> list[Described]:
     return out
 
 
-def refined(
-    form: Described, blocks: Sequence[Block], carried: Mapping[str, Mapping], values: Mapping[str, float]
-) -> Described:
+def refined(machine: WithForms, form: Described, blocks: Sequence[Block], carried, values) -> Described:
     """A form with the shape that explains most of what is left with it out, near the one that it has.
 
-    ``blocks`` are those at the point that ``values`` has, the form's own coefficients among them.
+    Parameters
+    ----------
+    blocks : those at the point that ``values`` has, the form's own coefficients among them
+    carried : by recording and equation, the weights of its rows
     """
-    if form.channel:  # its columns are differences of all equations: too dear to look around
-        return form
     own = []
     for b in blocks:
         if b.equation == form.equation:
             here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
-            own.append(replace(b, residual=b.residual - here @ form.columns(b)))
+            columns = machine.columns(form, b)
+            own.append(b if columns is None else replace(b, residual=b.residual - here @ columns))
+    if not own:  # a channel's: its columns are differences of all equations, too dear to look around
+        return form
     left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own])
     module = FORMS[form.word]
 
@@ -183,13 +189,9 @@ def refined(
     best = value(form)
     for _ in range(REFINED):
         for k, (name, at, width, unit) in enumerate(form.shape):
-            if width == 0.0:
-                continue
-            for step in STEPS:
-                trial = replace(
-                    form, shape=(*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
-                )
-                found = value(trial)
+            for step in STEPS if width > 0.0 else ():
+                shape = (*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
+                found = value(replace(form, shape=shape))
                 if found > best:
-                    best, form = found, trial
+                    best, form = found, replace(form, shape=shape)
     return form

@@ -156,7 +156,7 @@ class Bench(NormalEquations):
         if not mine:
             return False
         blocks = self._left()
-        better = {f.id: refined(f, blocks, self.carried, self.point) for f in mine}
+        better = {f.id: refined(self.machine, f, blocks, self.carried, self.point) for f in mine}
         before = self.described
         self.describe([better.get(f.id, f) for f in before])
         return self.described != before

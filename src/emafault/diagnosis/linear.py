@@ -38,14 +38,15 @@ def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.nda
     """Columns of an equation's undescribed remainder, ``size`` high: functions of each coordinate, the equation's own
     drivers with coefficients that change along them, and slow functions with coefficients of each recording's own."""
     drivers, phi = block.coordinates["drivers"], block.coordinates["phi"]
+    sizes = block.coordinates.get("sizes", {})  # of drivers whose coefficient is known to change by so much
     names, columns = [], []
     for f, function in enumerate(phi):
         names.append(f"remainder.{block.equation}.0.{f}")
         columns.append(size * function)
     for d, driver in enumerate(drivers[1:], start=1):
-        for f in block.coordinates["slow"]:
+        for f in block.coordinates["slow"] if sizes.get(d, size) > 0.0 else ():
             names.append(f"remainder.{block.equation}.{d}.{f}")
-            columns.append(size * driver * phi[f])
+            columns.append(sizes.get(d, size) * driver * phi[f])
     for f in block.coordinates.get("each", ()):
         names.append(f"remainder.{block.equation}.0.{f}@{block.recording}")
         columns.append(size * phi[f])

@@ -12,7 +12,7 @@ from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
 from ..diagnosis.naming import NAMED
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Model, inclusion
+from ..diagnosis.search import NEAR, Model, inclusion
 
 CLEAR = 3.0  # nats of predictive density, by which a member has been seen to help or to harm (Kass and Raftery 1995,
 # JASA 90, 773)
@@ -46,15 +46,15 @@ def held_to_account(
             odds = _log_odds(fit.models, effect) + ratios[effect]
             if odds < _log_odds(models, effect):
                 mass = _log_mass(models, effect)
-                models.append(replace(_instead(whole, models, effect), log_posterior=float(mass - odds)))
+                models += _moved(whole, models, effect, True, float(mass - odds))
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)
         if ratios[form] < CLEAR:
-            mass = _log_mass(models, form)
-            instead = max(_without(whole, models, form), _instead(whole, models, form), key=lambda m: m.log_posterior)
-            models[:] = [m for m in models if form not in m.units]
-            models.append(replace(instead, log_posterior=mass))
+            leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
+            left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
+            moved = _moved(whole, models, form, left, _log_mass(models, form))
+            models[:] = [*(m for m in models if form not in m.units), *moved]
     return sorted(models, key=lambda m: -m.log_posterior), ratios
 
 
@@ -102,17 +102,20 @@ def _log_mass(models: Sequence[Model], unit: str) -> float:
     return float(logsumexp([m.log_posterior for m in models if unit in m.units]))
 
 
-def _without(whole: Fit, models: Sequence[Model], unit: str) -> Model:
-    """The leading set with a unit, less that one."""
-    leading = max((m for m in models if unit in m.units), key=lambda m: m.log_posterior)
-    return whole.search.fit(tuple((c.unit, c.variant) for c in leading.choices if c.unit != unit))
+def _moved(whole: Fit, models: Sequence[Model], unit: str, left: bool, mass: float) -> list[Model]:
+    """The likely sets with a unit, each less that one, with or without a remainder in its place, sharing a mass (log)
+    as they did."""
+    mine = [m for m in models if unit in m.units]
+    top = max(m.log_posterior for m in mine)
+    likely = [m for m in mine if m.log_posterior > top - NEAR]
+    all_of = logsumexp([m.log_posterior for m in likely])
+    return [replace(_less(whole, m, unit, left), log_posterior=float(m.log_posterior - all_of + mass)) for m in likely]
 
 
-def _instead(whole: Fit, models: Sequence[Model], effect: str) -> Model:
-    """The leading set with an effect, a remainder in that one's first equation in its place."""
-    leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
-    members = [(c.unit, c.variant) for c in leading.choices if c.unit != effect]
-    equations = whole.search.units[effect].equations
+def _less(whole: Fit, model: Model, unit: str, left: bool) -> Model:
+    """A set less a unit, with a remainder in that one's first equation in its place if asked."""
+    members = [(c.unit, c.variant) for c in model.choices if c.unit != unit]
+    equations = whole.search.units[unit].equations if left else ()
     places = [u for q in equations for u, v in whole.search.candidates if u.startswith(f"remainder:{q}")]
     if places and not set(places) & {u for u, _ in members}:
         members.append((places[0], 0))

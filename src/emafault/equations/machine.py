@@ -37,6 +37,7 @@ CHANNELS = {
     "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
     "electrical_b": ("current_b",), "electrical_c": ("current_c",),
 }  # fmt: skip
+SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
 SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 BACK_EMF = 2  # driver of the electrical equations: speed times the shape
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
@@ -363,12 +364,18 @@ class ReferenceActuator:
         phi = list(base.pop("phi"))
         w = rec.speed / 100.0
         drivers = [np.broadcast_to(1.0, rec.size)]
+        kinds: dict[str, Any] = {
+            "slow": SLOW_FUNCTIONS,
+            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
+        }
         if equation.startswith("electrical"):
             j = "abc".index(equation[-1])
             drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
         elif equation == "torque":  # friction, torque constant, inertia
             typical = typical_torque(rec.actuator)
             drivers += [rec.direction, state.drive / typical, rec.acceleration * rec.actuator.inertia / typical]
+            # a change of both together would leave nothing of the equation
+            kinds["sizes"] = {2: SHARE * typical, 3: 0.0}
         elif equation == "sensor_speed":
             drivers += [w]
         elif equation == "sensor_current":
@@ -379,10 +386,6 @@ class ReferenceActuator:
         elif equation == "position":
             drivers += [rec.direction, rec.acceleration / 1e3]
         of: Callable[[np.ndarray], np.ndarray] | None = None
-        kinds: dict[str, Any] = {
-            "slow": SLOW_FUNCTIONS,
-            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
-        }
         if equation == "control":
             width = control.block_length(rec)
             blocks = (np.arange(rec.size // width - 1) + 1) * width

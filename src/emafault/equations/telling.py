@@ -40,7 +40,7 @@ def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, fl
         ),
         "sensor_speed": (("the recorded speed", "rad/s", 1.0), ("the scale of the recorded speed", "1", 0.01)),
         "sensor_current": (
-            ("the sum of the recorded currents", "A", 1.0),
+            ("each of the recorded currents", "A", 1.0 / 3.0),
             ("the gain of current a against c", "1", 1.0), ("the gain of current b against c", "1", 1.0),
         ),
         "position": (
@@ -105,7 +105,7 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         source = WORDS[memory.SOURCES[int(form.values["source"])]]
         says = f"{what} builds up with the {source}, with a time constant of {of('time_constant')}"
     else:
-        knots = [found[n] for n in function.COEFFICIENTS]
+        knots = [found[n] for n in function.VALUES]
         low, high = min(v for v, _ in knots), max(v for v, _ in knots)
         unit = "" if knots[0][1] == "1" else f" {knots[0][1]}"
         says = (

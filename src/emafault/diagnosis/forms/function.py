@@ -1,18 +1,23 @@
-"""A function of one coordinate: a cubic spline through six knots, constant beyond them."""
+"""A function of one coordinate: a cubic spline through six knots, constant beyond them; its values at the knots add up
+to nothing, for a constant is a coefficient that every machine has."""
 
 from collections.abc import Mapping
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import null_space
 
-from ..left import Found, Left, Shape, gain, of_cells, without
+from ..left import Found, Left, Shape, beside_first, gain, of_cells
 from ..model import Block
 
 ALONG = "function"  # the coordinate that its shape names
 EACH = False
 CHANNELS: tuple[str, ...] = ()
 KNOTS = 6
-COEFFICIENTS = tuple(f"at_{k + 1}" for k in range(KNOTS))
+VALUES = tuple(f"at_{k + 1}" for k in range(KNOTS))
+COEFFICIENTS = tuple(f"c_{k + 1}" for k in range(KNOTS - 1))
+#: (knot, coefficient) values that add up to nothing
+SHAPES = null_space(np.ones((1, KNOTS)))
 #: coordinate -> unit
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
 CELLS = 40  # of the range
@@ -20,13 +25,13 @@ FEWEST = 3  # temperatures that show a function of it
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(knot, row) splines that are one at their knot and zero at the others."""
+    """(coefficient, row) splines whose values at the knots are ``SHAPES``."""
     along = tuple(COORDINATES)[int(shape["coordinate"])]
     return _splines(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
 
 
 def _splines(x, knots: np.ndarray) -> np.ndarray:
-    of = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
+    of = CubicSpline(knots, SHAPES, bc_type="not-a-knot")
     return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
 
 
@@ -56,8 +61,11 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The same: knots are where the range has them."""
-    products = left.products(lambda b: columns(b.coordinates, shape), driver)
-    value = gain(*without(*products, np.ones(KNOTS)))
+
+    def of(b: Block) -> np.ndarray:
+        return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, shape)])
+
+    value = gain(*beside_first(*left.products(of, driver)))
     along = tuple(COORDINATES)[int(shape["coordinate"])]
     found = tuple((n, v, 0.0, "" if n == "coordinate" else COORDINATES[along]) for n, v in shape.items())
     return [Found(found, value, float(len(COORDINATES)))]
@@ -65,4 +73,4 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 
 def told(values: np.ndarray) -> dict[str, float]:
     """Values at the knots."""
-    return dict(zip(COEFFICIENTS, map(float, values), strict=True))
+    return dict(zip(VALUES, (SHAPES @ values).tolist(), strict=True))
