@@ -12,13 +12,13 @@ from .linearisation import Carried, Task
 from .model import LISTED, Block
 from .normal import NormalEquations
 from .point import is_parameter
-from .search import OTHER_FORM, Model, Search
+from .search import NEAR, OTHER_FORM, Model, Search
 
 ROUNDS = 3
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
-SINGLES = 5  # listed effects that a search may begin at in the place of what leads
+SINGLES = 3  # listed effects that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
 STILL = 0.3  # prior standard deviations by which the point may still move
 FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
@@ -70,32 +70,27 @@ class Bench(NormalEquations):
 
         ``begun``: a bench of some of these recordings and its fit, to go on from.
         """
-        if begun is None:
-            # the unit first: its nuisances move the point before anything is compared, but not to where only a cause
-            # that is missing would have them
-            self.reach = self.reaches[0]
-            self.settle(NOTHING)
+        whites, normal, search = self._explored() if begun is None else self._gone_on(*begun)
+        if self.describing:
+            whites, normal, search = self._by_what_leads(whites, normal, search)
+        return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
+
+    def _explored(self) -> tuple[list[White], Normal, Search]:
+        # the unit first: its nuisances move the point before anything is compared, but not to where only a cause that
+        # is missing would have them
+        self.reach = self.reaches[0]
+        self.settle(NOTHING)
+        whites, normal = self._renewed()
+        if self._describe("first"):
             whites, normal = self._renewed()
-            if self._describe("first"):
-                whites, normal = self._renewed()
-            self.reach = self.reaches[1]
-            if self.describing and self._begun_at_single(normal):
-                whites, normal = self._renewed()
-            # what no one has described comes last: it would take up what only a better point explains
-            whites, normal, search = self._until_still(whites, normal, FIRST, False)
-            more = self._describe("led")
-            if self._carry_own_forms(search) or more:
-                whites, normal = self._renewed()
-        else:
-            bench, fit = begun
-            self.describe(bench.described)
-            self.point |= {n: v for n, v in fit.values.items() if n in self.point}
-            self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
-            self.carried |= fit.carried
-            # until they are fitted, what the others' fit leaves of further recordings is their noise
-            as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
-            self._each(as_left, [n for n in self.recordings if n not in fit.carried])
-            self.settle(fit.models[0])
+        self.reach = self.reaches[1]
+        if self.describing and self._begun_at_single(normal):
+            whites, normal = self._renewed()
+        # what no one has described comes last: it would take up what only a better point explains
+        whites, normal, search = self._until_still(whites, normal, FIRST, False)
+        self._keep_likely(search)
+        more = self._describe("led")
+        if self._carry_own_forms(search) or more:
             whites, normal = self._renewed()
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
@@ -103,9 +98,22 @@ class Bench(NormalEquations):
                 break
             whites, normal = self._renewed()
             whites, normal, search = self._until_still(whites, normal, ROUNDS)
-        if self.describing:
-            whites, normal, search = self._by_what_leads(whites, normal, search)
-        return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
+        return whites, normal, search
+
+    def _gone_on(self, bench: "Bench", fit: Fit) -> tuple[list[White], Normal, Search]:
+        self.describe(bench.described)
+        self.point |= {n: v for n, v in fit.values.items() if n in self.point}
+        self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
+        self.carried |= fit.carried
+        # until they are fitted, what the others' fit leaves of further recordings is their noise
+        as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
+        self._each(as_left, [n for n in self.recordings if n not in fit.carried])
+        self.settle(fit.models[0])
+        if self.describing:  # by what leads: see ``fit``
+            whites = self.linearise()
+            normal = self.normal(whites)
+            return whites, normal, self._search(normal)
+        return self._until_still(*self._renewed(), ROUNDS)
 
     def _by_what_leads(self, whites: list[White], normal: Normal, search: Search) -> tuple[list[White], Normal, Search]:
         """Search once more with the noise that the leading set leaves, until it leads by that too.
@@ -145,6 +153,12 @@ class Bench(NormalEquations):
         found = [f for f in found if not any(f.same(g) for g in self.described)]
         self.describe([*self.described, *found])
         return bool(found)
+
+    def _keep_likely(self, search: Search) -> None:
+        """Let go of described forms that no likely set has."""
+        ranked = search.ranked()
+        likely = {u for m in ranked if m.log_posterior > ranked[0].log_posterior - NEAR for u in m.units}
+        self.describe([f for f in self.described if f.id in likely])
 
     def _left(self) -> list[Block]:
         return [b for n in self.recordings for b in self.machine.blocks(self.values(), n, wanted=())]
