@@ -13,6 +13,7 @@ from .search import FORM_PRIOR
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
+BINS = 30  # of a picture
 REFINED = 3  # rounds over the parameters of a shape
 STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
@@ -31,6 +32,7 @@ class Described:
     shape: tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation, unit
     scale: float  # of its coefficients
     among: float  # alternatives that the scan could have told from it
+    seen: str = ""  # equation whose scan has found it, where it acts in several
     channel: str = ""  # of the measuring chain, or a coefficient: what several equations have it through
 
     @property
@@ -157,7 +159,17 @@ def _elsewhere(machine, form: Described) -> list[Described]:
     for place in names:
         equation, scale = machine.place(place, form.equation)
         name = f"{form.id}_{place}"
-        out.append(replace(form, id=name, equation=equation, channel=place, scale=scale, among=form.among * len(names)))
+        out.append(
+            replace(
+                form,
+                id=name,
+                equation=equation,
+                seen=form.equation,
+                channel=place,
+                scale=scale,
+                among=form.among * len(names),
+            )
+        )
     return out
 
 
@@ -169,12 +181,7 @@ def refined(machine: WithForms, form: Described, blocks: Sequence[Block], carrie
     blocks : those at the point that ``values`` has, the form's own coefficients among them
     carried : by recording and equation, the weights of its rows
     """
-    own = []
-    for b in blocks:
-        if b.equation == form.equation:
-            here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
-            columns = machine.columns(form, b)
-            own.append(b if columns is None else replace(b, residual=b.residual - here @ columns))
+    own = without(machine, form, [b for b in blocks if b.equation == form.equation], values)
     if not own:  # a channel's: its columns are differences of all equations, too dear to look around
         return form
     left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own])
@@ -195,3 +202,50 @@ def refined(machine: WithForms, form: Described, blocks: Sequence[Block], carrie
                 if found > best:
                     best, form = found, replace(form, shape=shape)
     return form
+
+
+def without(machine: WithForms, form: Described, blocks: Sequence[Block], values: Mapping[str, float]) -> list[Block]:
+    """Blocks with what a form's coefficients take out of them put back."""
+    out = []
+    for b in blocks:
+        here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
+        columns = machine.columns(form, b)
+        out.append(b if columns is None else replace(b, residual=b.residual - here @ columns))
+    return out
+
+
+def curve(
+    machine: WithForms, form: Described, blocks: Sequence[Block], carried: Mapping[str, Mapping], values: Mapping
+) -> dict[str, list[float]]:
+    """What the equation that shows a form leaves along the form, with it out of the model and in.
+
+    Returns
+    -------
+    ``x`` middle of each of ``BINS``; ``before``, ``after`` generalised least-squares means over them, of the driver's
+    coefficient; ``error``, their standard errors
+    """
+    module = FORMS[form.word]
+    own = [b for b in blocks if b.equation == (form.seen or form.equation)]
+    along = {}
+    for b in own:
+        here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
+        along[b.recording] = module.position(b.coordinates, form.values, here)
+    low, high = min(x.min() for x in along.values()), max(x.max() for x in along.values())
+    edges = np.linspace(low, high, BINS + 1)
+
+    def cells(b: Block) -> np.ndarray:
+        at = np.clip(np.searchsorted(edges, along[b.recording], "right") - 1, 0, BINS - 1)
+        return at == np.arange(BINS)[:, None]
+
+    means = []
+    for which in (without(machine, form, own, values), own):
+        left = Left(form.seen or form.equation, which, [carried[b.recording][b.equation] for b in own])
+        g, G = left.products(cells, form.driver)
+        used = np.diag(G) > 1e-9 * np.diag(G).max()
+        inverse = np.linalg.pinv(G[np.ix_(used, used)], hermitian=True)
+        means.append(inverse @ g[used])
+    x = 0.5 * (edges[1:] + edges[:-1])[used]
+    return {
+        "x": x.tolist(), "before": means[0].tolist(), "after": means[1].tolist(),
+        "error": np.sqrt(np.maximum(np.diag(inverse), 0.0)).tolist(),
+    }  # fmt: skip

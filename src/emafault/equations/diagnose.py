@@ -11,6 +11,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
+from ..diagnosis.described import curve
 from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit
 from ..diagnosis.linear import White
@@ -302,7 +303,11 @@ def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, mode
             if p.name in model.deviations
         }
         if form in described:
+            values = bench.point | {n: v for n, (v, _) in linear.items()}
+            blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
+            found = curve(bench.machine, described[form], blocks, bench.carried, values)
             entry = telling.told(described[form], linear, machine.actuator)
+            entry["curve"] = telling.picture(described[form], found, machine.actuator)
         else:
             kind = next(v for k, v in FORM.items() if form.startswith(k))
             channel = form.split("_", 1)[1].replace("_", " of phase ")

@@ -77,6 +77,26 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
         page.paragraph(sentence, "lead")
     page.heading("What these recordings cannot tell")
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
+    described = [d for d in verdict["discovered"] if d["form"] != "remainder"]
+    if described:
+        page.heading("What no catalogue lists")
+        rows = [
+            [
+                d["form"].replace("_", " "), d["equation"].replace("_", " "), d["along"].replace("_", " "),
+                _fitted(d), f"{d['probability']:.3f}", "" if d["closed"] is None else f"{d['closed']:.1%}",
+            ]
+            for d in described
+        ]  # fmt: skip
+        columns = ["form", "equation", "along", "parameters with 90 % intervals", "probability", "closes alone"]
+        page.table(columns, rows)
+        curves = [
+            d["curve"] | {"title": f"{d['equation']}: {d['form']}".replace("_", " ")} for d in described if "curve" in d
+        ]
+        if curves:
+            page.figure(
+                "described", figures.draw_described(curves),
+                "What the equation leaves along the form, without it in the model and with it, with 90 % bands.",
+            )  # fmt: skip
     page.heading("Where: residual by equation and operating region")
     rows = [
         [

@@ -1,6 +1,7 @@
 """Described forms in words and physical units: what a driver of an equation, a channel or a coefficient is."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,22 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
         "equation": where, "along": along,
         "form": "coefficient" if form.word == "function" and form.driver else form.word, "parameters": parameters,
         "sentence": _sentence(form, where, what, {n: (p["value"], p["units"]) for n, p in parameters.items()}, along),
+    }  # fmt: skip
+
+
+def picture(form: Described, found: Mapping[str, list[float]], actuator: ActuatorParameters) -> dict[str, Any]:
+    """A form's curve in physical units, with what its axes are."""
+    at_place = replace(form, channel="", equation=form.seen or form.equation)
+    what, units, factor = subject(at_place, actuator)
+    axis = FORMS[form.word].AXIS
+    if form.word == "function":
+        along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
+        axis = f"{along.replace('_', ' ')} ({function.COORDINATES[along]})"
+    scaled = {n: [factor * v for v in found[n]] for n in ("before", "after")}
+    label = what.removeprefix("a ").removeprefix("the ") + ("" if units == "1" else f" ({units})")
+    return {
+        "x": found["x"], **scaled, "error": [abs(factor) * e for e in found["error"]],
+        "x_label": axis, "y_label": label,
     }  # fmt: skip
 
 

@@ -138,3 +138,23 @@ def draw_faults(groups: Sequence[Mapping[str, Any]]) -> plt.Figure:
         row[0].set_ylabel(group["label"], fontsize=8.5)
     axes[0, 0].legend(ncols=3, fontsize=8, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.1)
     return fig
+
+
+def draw_described(curves: Sequence[Mapping[str, Any]]) -> plt.Figure:
+    """What an equation leaves along a described form, with it out of the model and in, with 90 % bands.
+
+    ``curves``: x, before, after, error, x_label, y_label and title of each.
+    """
+    fig, axes = plt.subplots(1, len(curves), figsize=(4.8 * len(curves), 3.2), squeeze=False)
+    for ax, c in zip(axes[0], curves, strict=True):
+        x, error = np.array(c["x"]), 1.645 * np.array(c["error"])
+        for stage, colour, label in (("before", BEFORE, "without it"), ("after", AFTER, "with it")):
+            y = np.array(c[stage])
+            ax.fill_between(x, y - error, y + error, color=colour, alpha=0.2, lw=0)
+            ax.plot(x, y, color=colour, marker="o", ms=2.5, lw=1.2, label=label)
+        ax.axhline(0.0, color=FLOOR, lw=0.8)
+        ax.set_xlabel(c["x_label"])
+        ax.set_ylabel(c["y_label"])
+        ax.set_title(c["title"], fontsize=9)
+        ax.legend(fontsize=8, frameon=False)
+    return fig

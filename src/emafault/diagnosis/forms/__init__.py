@@ -10,6 +10,7 @@ columns(coordinates, shape) : (column, row) without the driver, of a shape by na
 coarse(left, driver) : a shape by name near which most stands out of what an equation leaves, with its approximate log
     Bayes factor; None where the recordings cannot show the form
 fine(left, driver, shape) : shapes near that one with their standard deviations
+position(coordinates, shape, coefficients) : (row,) what its picture goes along, and ``AXIS``, that in words
 told(coefficients) : what a reader wants of the coefficients: name -> value
 """
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..left import Found, Left, Shape, beside_first, of_cells, singly
 
+AXIS = "angle of the rotor (rad)"  # of its picture
 ALONG = "rotor_angle"
 EACH = False
 CHANNELS: tuple[str, ...] = ()
@@ -64,3 +65,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 def told(values: np.ndarray) -> dict[str, float]:
     """The depth itself."""
     return {"depth": float(values[0])}
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) the angle of the turn."""
+    return np.asarray(coordinates["rotor_angle"])

@@ -7,6 +7,7 @@ import numpy as np
 from ..left import Found, Left, Shape, gain
 from .spectrum import above, refined
 
+AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "time"
 EACH = True
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
@@ -58,3 +59,9 @@ def told(values: np.ndarray) -> dict[str, float]:
     """Amplitude: root mean square over the recordings of what each has."""
     pairs = np.asarray(values).reshape(-1, 2)
     return {"amplitude": float(np.sqrt(np.mean(np.sum(pairs**2, axis=1))))}
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) where rows lie along the wave."""
+    x = 2.0 * np.pi * shape["frequency"] * np.asarray(coordinates["time"])
+    return np.mod(x - np.arctan2(values[1], values[0]), 2.0 * np.pi)

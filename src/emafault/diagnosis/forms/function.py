@@ -10,6 +10,7 @@ from scipy.linalg import null_space
 from ..left import Found, Left, Shape, beside_first, gain, of_cells
 from ..model import Block
 
+AXIS = "coordinate"  # of its picture
 ALONG = "function"  # the coordinate that its shape names
 EACH = False
 CHANNELS: tuple[str, ...] = ()
@@ -74,3 +75,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 def told(values: np.ndarray) -> dict[str, float]:
     """Values at the knots."""
     return dict(zip(VALUES, (SHAPES @ values).tolist(), strict=True))
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) the coordinate that the shape names."""
+    return np.asarray(coordinates[tuple(COORDINATES)[int(shape["coordinate"])]])

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
 
+AXIS = "what has built up"  # of its picture
 ALONG = "time"
 EACH = False
 CHANNELS: tuple[str, ...] = ()
@@ -79,3 +80,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 def told(values: np.ndarray) -> dict[str, float]:
     """The gain itself."""
     return {"gain": float(values[0])}
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) the filtered source."""
+    return columns(coordinates, shape)[0]

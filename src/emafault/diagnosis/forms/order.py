@@ -7,6 +7,7 @@ import numpy as np
 from ..left import Found, Left, Shape, gain
 from .spectrum import above, refined
 
+AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "order"
 EACH = False
 CHANNELS: tuple[str, ...] = ("angle",)  # of the measuring chain that may have it
@@ -69,3 +70,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 def told(values: np.ndarray) -> dict[str, float]:
     """Amplitude and phase."""
     return {"amplitude": float(np.hypot(*values)), "phase": float(np.arctan2(values[1], values[0]))}
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) where rows lie along the wave."""
+    return np.mod(shape["order"] * np.asarray(coordinates["angle"]) - np.arctan2(values[1], values[0]), 2.0 * np.pi)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..left import Found, Left, Shape, beside_first, of_cells, singly
 
+AXIS = "time (s)"  # of its picture
 ALONG = "time"
 EACH = False
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
@@ -48,3 +49,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 def told(values: np.ndarray) -> dict[str, float]:
     """The jump itself."""
     return {"jump": float(values[0])}
+
+
+def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
+    """(row,) time."""
+    return np.asarray(coordinates["time"])
