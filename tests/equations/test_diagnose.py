@@ -81,6 +81,34 @@ def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     assert verdict["verdict"] == "partly"
 
 
+def test_a_pickup_is_described_and_the_effect_beside_it_is_named():
+    hummed = {}
+    for n, (name, r) in enumerate(bench(COGGING).items()):
+        hum = 0.1 * np.cos(2.0 * np.pi * 77.0 * r.time + n)
+        hummed[name] = replace(r, phase_voltage=r.phase_voltage + np.outer(hum, [1.0, 0.0, 0.0]))
+    verdict = verdict_of(hummed)
+    assert verdict["which"][0]["effects"] == ["cogging"] and verdict["verdict"] == "partly"
+    (found,) = verdict["discovered"]
+    assert (found["form"], found["equation"]) == ("frequency", "electrical_a")
+    assert found["parameters"]["frequency"]["value"] == pytest.approx(77.0, abs=0.2)
+    assert found["parameters"]["amplitude"]["value"] == pytest.approx(0.1, rel=0.1)
+    assert found["probability"] > 0.9 and found["closed"] is not None and "77" in found["sentence"]
+    before, after = np.array(found["curve"]["before"]), np.array(found["curve"]["after"])
+    assert np.ptp(before) > 0.15 and np.ptp(after) < 0.3 * np.ptp(before)
+
+
+def test_a_disc_out_of_centre_is_told_in_the_angle_sensor():
+    eccentric = {
+        name: replace(r, rotor_angle=r.rotor_angle + 2e-3 * np.cos(r.rotor_angle + 0.5)) for name, r in bench().items()
+    }
+    verdict = verdict_of(eccentric)
+    assert verdict["verdict"] == "described" and not any(p > 0.5 for p in verdict["inclusion"].values())
+    (found,) = verdict["discovered"]
+    assert (found["form"], found["equation"]) == ("order", "sensor_angle")
+    assert found["parameters"]["order"]["value"] == 1.0
+    assert found["parameters"]["amplitude"]["value"] == pytest.approx(2e-3, rel=0.1)
+
+
 def test_names_and_order_of_files_change_nothing(cogging):
     recordings = bench(COGGING)
     renamed = {f"x{9 - n}.nc": r for n, r in enumerate(recordings.values())}

@@ -88,9 +88,10 @@ class Bench(NormalEquations):
             whites, normal = self._renewed()
         # what no one has described comes last: it would take up what only a better point explains
         whites, normal, search = self._until_still(whites, normal, FIRST, False)
+        before = self.described
         self._keep_likely(search)
-        more = self._describe("led")
-        if self._carry_own_forms(search) or more:
+        self._describe("led")
+        if self._carry_own_forms(search) or self.described != before:
             whites, normal = self._renewed()
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
