@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .evidence import Definite
 from .forms import FORMS
 from .left import Left, gain
 from .linearisation import SETTINGS
-from .model import WORDS, Block, Parameter, Unit, Variant
-from .search import FORM_PRIOR
+from .model import LISTED, WORDS, Block, Parameter, Unit, Variant
+from .search import FORM_PRIOR, OTHER_FORM, Search
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
@@ -17,6 +18,7 @@ BINS = 30  # of a picture
 REFINED = 3  # rounds over the parameters of a shape
 STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
+ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
 SPAN = 3.0  # widest prior of a coefficient over the noise of a row
 
@@ -249,3 +251,27 @@ def curve(
         "x": x.tolist(), "before": means[0].tolist(), "after": means[1].tolist(),
         "error": np.sqrt(np.maximum(np.diag(inverse), 0.0)).tolist(),
     }  # fmt: skip
+
+
+def another_form_of(search: Search, unit: str, deviations: Mapping[str, float]) -> str | None:
+    """Listed effect whose signal is nearly that of a form, the nuisances taken out of both; None where there is none.
+
+    ``deviations``: the form's coefficients. The cosine is that between what the form adds and the nearest that the
+    effect can.
+    """
+    M, index = search.reduced.M, search.reduced.index
+    own = [n for n in search.candidates[unit, 0].names if n in deviations]
+    k, c = np.array([index[n] for n in own], int), np.array([deviations[n] for n in own])
+    power = float(c @ M[np.ix_(k, k)] @ c)
+    best, nearest = ALIKE**2, None
+    for (other, variant), candidate in search.candidates.items():
+        if search.units[other].kind not in LISTED or variant >= OTHER_FORM or power <= 0.0:
+            continue
+        j = candidate.index
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(M)[j], 1e-300))
+        score = scale * (M[np.ix_(j, k)] @ c)
+        own_power = M[np.ix_(j, j)] * np.outer(scale, scale) + 1e-9 * np.eye(len(j))
+        share = float(score @ Definite(own_power).solve(score)) / power
+        if share > best:
+            best, nearest = share, other
+    return nearest

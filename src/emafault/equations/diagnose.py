@@ -11,7 +11,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
-from ..diagnosis.described import curve
+from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite
 from ..diagnosis.fit import NOTHING, Bench, Fit
 from ..diagnosis.linear import White
@@ -171,7 +171,7 @@ def _diagnosed(
     verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
-    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best)]
+    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search)]
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = _null(bench).values()
     spreads = _spreads(bench, fit, best)
@@ -291,7 +291,7 @@ def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
     return str(found[0]["equation"]) if found else "electrical"
 
 
-def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, model: Model) -> list[dict]:
+def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, model: Model, search: Search) -> list[dict]:
     """Forms that no catalogue lists, and remainders, as the verdict tells them."""
     out = []
     described = {d.id: d for d in bench.described}
@@ -322,7 +322,8 @@ def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, mode
             }  # fmt: skip
         out.append(
             {
-                "unit": form, "probability": float(reading.inclusion[form]), "closed": None, "another_form_of": None,
+                "unit": form, "probability": float(reading.inclusion[form]), "closed": None,
+                "another_form_of": another_form_of(search, form, model.deviations),
                 "recordings": list(bench.recordings), **entry,
             }
         )  # fmt: skip

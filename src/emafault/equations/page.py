@@ -19,7 +19,7 @@ TOLD_OF = 0.01  # probability from which a set behind the first has its paramete
 
 def finding(verdict: Mapping[str, Any]) -> list[str]:
     """What was found, a sentence each: the measuring chain first, then the machine, then the controller."""
-    out = [d["sentence"] for d in verdict["discovered"] if d["form"] != "remainder"]
+    out = [_said(d) for d in verdict["discovered"] if d["form"] != "remainder"]
     kind, first = verdict["verdict"], verdict["which"][0]
     if kind in ("explained", "partly") and first["effects"]:
         sentences = [TERMS[e].SENTENCE for e in first["effects"] if e in TERMS]
@@ -57,6 +57,12 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             else "On recordings not looked at before this closes nothing of the gap."
         )
     return out
+
+
+def _said(found: Mapping[str, Any]) -> str:
+    if found["another_form_of"] is None:
+        return str(found["sentence"])
+    return f"{found['sentence'][:-1]}: much like another form of {found['another_form_of'].replace('_', ' ')}."
 
 
 def _fitted(entry: Mapping[str, Any]) -> str:

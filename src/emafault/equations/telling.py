@@ -108,7 +108,8 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
 
     place = "In the measuring chain" if where.startswith("sensor") else f"In the {where.replace('_', ' ')} equation"
     if form.word == "order":
-        says = f"{what} has a wave {of('order')} times per turn of the rotor, with an amplitude of {of('amplitude')}"
+        often = "once" if found["order"][0] == 1.0 else f"{found['order'][0]:.4g} times"
+        says = f"{what} has a wave {often} per turn of the rotor, with an amplitude of {of('amplitude')}"
     elif form.word == "frequency":
         says = f"{what} oscillates at {of('frequency')} with an amplitude of {of('amplitude')}"
     elif form.word == "bump":
