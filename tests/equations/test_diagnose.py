@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emafault.equations.corrected import write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
+from emafault.io.recording import read_recording
 
 from .conftest import ACTUATOR, NOISE, recorded
 
@@ -123,3 +125,23 @@ def test_names_and_order_of_files_change_nothing(cogging):
 def test_an_effect_that_does_not_exist_is_refused():
     with pytest.raises(InputError, match="nothing_such"):
         verdict_of(bench(), exclude=("nothing_such",))
+
+
+def test_faults_of_the_measuring_chain_are_undone_in_new_files(tmp_path):
+    true = bench()
+    faulty = {}
+    for n, (name, r) in enumerate(true.items()):
+        hum = 0.1 * np.cos(2.0 * np.pi * 77.0 * r.time + n)
+        angle = r.rotor_angle + 2e-3 * np.cos(r.rotor_angle)
+        faulty[name] = replace(r, phase_voltage=r.phase_voltage + np.outer(hum, [0.0, 1.0, 0.0]), rotor_angle=angle)
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    undone = write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")
+    assert sorted(undone) == ["frequency of the voltage of phase b channel", "order of the angle channel"]
+    for name, r in true.items():
+        got = read_recording(tmp_path / "new" / name)
+        for channel in ("phase_voltage", "rotor_angle"):
+            left = np.std(getattr(got, channel) - getattr(r, channel))
+            assert left < 0.2 * np.std(getattr(faulty[name], channel) - getattr(r, channel)), channel
+    with pytest.raises(InputError, match="holds files already"):
+        write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")

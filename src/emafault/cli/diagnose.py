@@ -26,6 +26,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--experiment", metavar="NAME", help="write the fix as conf/experiment/NAME.yaml too, for snakemake to run"
     )
+    parser.add_argument(
+        "--corrected", metavar="DIR", help="write the recordings with the faults of their measuring chain undone to DIR"
+    )
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
 
@@ -49,8 +52,10 @@ def run(args: argparse.Namespace) -> None:
     if args.twin == "actuator":
         from ..equations.run import diagnose_folder
 
-        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking)
+        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, args.corrected)
     else:
+        if args.corrected:
+            raise InputError("--corrected: only recordings of the actuator can be corrected")
         if target is not None:
             raise InputError("--experiment: a measured machine has no simulator that could run one")
         from ..machines.run import diagnose_file

@@ -20,7 +20,7 @@ STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
 ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
-SPAN = 3.0  # widest prior of a coefficient over the noise of a row
+SPAN = 10.0  # widest prior of a coefficient over the noise of a row
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from .linear import OWN_FORM, White, assemble, full_model, white_rows
 from .linearisation import Carried, Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .point import Point, is_parameter
-from .search import OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
+from .search import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
 
 OWN_SHARES = (1.0, 0.2)  # of the largest own form: as far from the library's as a form is, or near it
 
@@ -163,6 +163,7 @@ class NormalEquations(Point):
                 owns.setdefault(n.split(".")[1], []).append(k)
         for unit in self.units:
             own = np.array(owns.get(unit.id, ()), int)
+            widths = FORM_WIDTHS if unit.kind == "form" else WIDTHS
             for v, variant in enumerate(self.active(unit)):
                 names = [p.name for p in variant.parameters]
                 if not all(n in reduced.index for n in names):
@@ -173,7 +174,7 @@ class NormalEquations(Point):
                 switch = any(p.mean != p.off for p in variant.parameters) and len(names) == 1
                 plain = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
-                    (1.0,) if switch else tuple(w for w in WIDTHS if w >= min(variant.least, 1.0)), names,
+                    (1.0,) if switch else tuple(w for w in widths if w >= min(variant.least, 1.0)), names,
                     np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain

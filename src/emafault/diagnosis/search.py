@@ -15,6 +15,7 @@ SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
+FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range no catalogue gives
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
 OTHER_FORM = 10  # added to a variant's number, once for each kind of own form that the unit may take
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one

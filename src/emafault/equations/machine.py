@@ -40,6 +40,7 @@ CHANNELS = {
 SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
 SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 BACK_EMF = 2  # driver of the electrical equations: speed times the shape
+STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
@@ -228,7 +229,7 @@ class ReferenceActuator:
             return equation, K_SCALE
         noise = next(iter(self.recordings.values())).noise
         name = {"output": "position"}.get(quantity, quantity)
-        return "position" if quantity == "output" else f"sensor_{quantity}", float(getattr(noise, name))
+        return "position" if quantity == "output" else f"sensor_{quantity}", STANDS_OUT * float(getattr(noise, name))
 
     def seen_in(self, place: str, name: str, x: np.ndarray) -> dict[str, np.ndarray]:
         """By equation (column, row): what signals x (column, sample) on a channel, or relative changes x of a
@@ -238,7 +239,7 @@ class ReferenceActuator:
         if place.startswith("k_"):
             return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
         before = self._recording(off, rec, ())
-        step = self.place(place, "")[1]
+        step = self.place(place, "")[1] / STANDS_OUT
         found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}
         for row in x:
             for b, at in zip(before, self._recording(off, rec.less(place, step * row), ()), strict=True):

@@ -61,11 +61,16 @@ def _repeated(x: np.ndarray) -> float:
 
 def _spiked(x: np.ndarray) -> float:
     """Share of single samples that stand out of their neighbours."""
+    lone = spiked(x)
+    return float(lone.mean()) if lone.sum() >= FEWEST else 0.0
+
+
+def spiked(x: np.ndarray) -> np.ndarray:
+    """(sample less 2,) which samples but the first and the last stand out of their neighbours by themselves."""
     bend = x[1:-1] - 0.5 * (x[:-2] + x[2:])
     scale = np.median(np.abs(bend)) / 0.6745
     out = np.abs(bend) > SPIKE * scale if scale > 0.0 else np.zeros(len(bend), bool)
-    lone = out & (np.abs(bend) >= np.abs(np.roll(bend, 1))) & (np.abs(bend) >= np.abs(np.roll(bend, -1)))
-    return float(lone.mean()) if lone.sum() >= FEWEST else 0.0
+    return out & (np.abs(bend) >= np.abs(np.roll(bend, 1))) & (np.abs(bend) >= np.abs(np.roll(bend, -1)))
 
 
 def _entry(

@@ -11,6 +11,7 @@ from ..io.bench import read_bench
 from ..io.split import split_bench
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder
+from .corrected import write_corrected
 from .diagnose import diagnose
 from .handover import experiment_text
 from .page import draw, finding
@@ -25,6 +26,7 @@ def diagnose_folder(
     exclude: Sequence[str] = (),
     experiment: str | Path | None = None,
     track: bool = True,
+    corrected: str | Path | None = None,
 ) -> dict:
     """Diagnose a folder of recordings; write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
@@ -34,6 +36,7 @@ def diagnose_folder(
     out : folder to write to; None takes ``results/diagnoses/<name of the bench>``
     exclude : effects that the library is to lack
     experiment : file that receives the fix as an experiment, besides the one among the results
+    corrected : new folder for the recordings with the faults of their measuring chain undone
     track : whether to log an MLflow run; one that fails is said so and breaks nothing
 
     Raises
@@ -54,6 +57,9 @@ def diagnose_folder(
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)
+    if corrected is not None:
+        undone = write_corrected(found, bench.recordings, path, corrected)
+        print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
     truths = {n: r.fault for n, r in bench.recordings.items()}
     draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
     print(f"written to {folder}", flush=True)

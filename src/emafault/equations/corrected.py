@@ -1,0 +1,130 @@
+"""Recordings with what was found in the measuring chain undone, as new files."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..diagnosis.forms import FORMS
+from ..errors import InputError
+from ..io.recording import Recording, write_recording
+from .acquisition import advanced, delayed
+from .diagnose import Diagnosed
+from .quality import spiked
+
+Undo = Callable[[Recording], Recording]
+#: forms that a voltage of one phase has from its channel: nothing in the machine makes them
+OF_THE_CHANNEL = ("frequency", "step_change")
+
+
+def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
+    """The recordings less the faults of their measuring chain, and what has been undone.
+
+    Lag, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are replaced
+    by the mean of their neighbours. What cannot be undone (held samples, steps of a converter, clipping) stays.
+    """
+    out, undone = {}, dict[str, None]()
+    for name, recording in recordings.items():
+        for what, undo in _steps(found, name, len(recording.time)):
+            recording = undo(recording)
+            undone[what] = None
+        out[name] = recording
+    return out, list(undone)
+
+
+def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]:
+    """What is to be undone in a recording, in words, and how."""
+    told = {d["unit"] for d in found.verdict["discovered"]}
+    values = found.values
+    if "~spikes" in told:
+        yield "spikes of the currents", _without_spikes
+    for form in found.bench.described:
+        of_voltage = form.equation.startswith("electrical_") and form.driver == 0 and form.word in OF_THE_CHANNEL
+        channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
+        if form.id in told and channel and not channel.startswith("k_"):
+            own = np.array([values.get(n, 0.0) for n in form.names(name)])
+            x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name), form.values)
+            words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
+            yield words, partial(_less, channel=channel, x=x)
+    for quantity in ("voltage", "current", "output"):
+        if f"~lag_{quantity}" in told:
+            late, early = (values.get(f"lag.{quantity}_{side}", 0.0) for side in ("late", "early"))
+            yield f"lag of the {quantity} channel", partial(_shifted, quantity=quantity, late=late, early=early)
+    if "~crosstalk_current" in told:
+        gains = np.array([[values.get(f"crosstalk.{j}{q}", 0.0) if j != q else 0.0 for q in "abc"] for j in "abc"])
+        yield "crosstalk between the currents", partial(_without_crosstalk, gains=gains)
+    share = (np.arange(size) + 0.5) / size
+    for quantity in ("voltage", "current"):
+        for phase in "abc":
+            if f"~drift_{quantity}_{phase}" in told:
+                x = values.get(f"drift_{quantity}.{phase}@{name}", 0.0) * share
+                yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
+
+
+def write_corrected(
+    found: Diagnosed, recordings: Mapping[str, Recording], bench: str | Path, folder: str | Path
+) -> list[str]:
+    """Write the corrected recordings under their names into a new folder; returns what has been undone.
+
+    Raises
+    ------
+    InputError : the folder is the bench's own, or holds files already
+    """
+    folder = Path(folder)
+    if folder.resolve() == Path(bench).resolve() or (folder.is_dir() and any(folder.iterdir())):
+        raise InputError(f"--corrected: '{folder}' holds files already, accepted is a new folder")
+    out, undone = corrected(found, recordings)
+    for name, recording in out.items():
+        write_recording(folder / name, recording)
+    return undone
+
+
+def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
+    if channel == "angle":
+        return replace(recording, rotor_angle=recording.rotor_angle - x)
+    if channel == "output":
+        return replace(recording, output_position=recording.output_position - x)
+    quantity, phase = channel.split("_")
+    off = np.outer(x, np.eye(3)["abc".index(phase)])
+    if quantity == "voltage":
+        return replace(recording, phase_voltage=recording.phase_voltage - off)
+    end = recording.phase_current_end
+    later = 0.5 * (off + np.vstack([off[1:], off[-1:]]))
+    return replace(
+        recording,
+        phase_current=recording.phase_current - off,
+        phase_current_end=None if end is None else end - later,
+    )
+
+
+def _shifted(recording: Recording, quantity: str, late: float, early: float) -> Recording:
+    def undone(x: np.ndarray) -> np.ndarray:
+        return np.apply_along_axis(lambda c: c + late * advanced(c) + early * delayed(c), 0, x)
+
+    if quantity == "current":
+        return _currents(recording, undone)
+    if quantity == "voltage":
+        return replace(recording, phase_voltage=undone(recording.phase_voltage))
+    return replace(recording, output_position=undone(recording.output_position))
+
+
+def _without_crosstalk(recording: Recording, gains: np.ndarray) -> Recording:
+    return _currents(recording, lambda x: x - x @ gains.T)
+
+
+def _currents(recording: Recording, of: Callable[[np.ndarray], np.ndarray]) -> Recording:
+    end = recording.phase_current_end
+    return replace(
+        recording, phase_current=of(recording.phase_current), phase_current_end=None if end is None else of(end)
+    )
+
+
+def _without_spikes(recording: Recording) -> Recording:
+    current = recording.phase_current.copy()
+    rows = np.flatnonzero(spiked(current.sum(axis=1))) + 1
+    bend = np.abs(current[rows] - 0.5 * (current[rows - 1] + current[rows + 1]))
+    phase = np.argmax(bend, axis=1)
+    current[rows, phase] = 0.5 * (current[rows - 1, phase] + current[rows + 1, phase])
+    return replace(recording, phase_current=current)
