@@ -1,0 +1,110 @@
+"""How far the gap shrinks on the recordings that took no part: the ladder in signal, features and fault vector."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..diagnosis.closure import closed, coefficients, placebo, rms, rows
+from ..diagnosis.fit import NOTHING, Bench
+from ..diagnosis.linear import White
+from ..diagnosis.naming import read
+from ..diagnosis.point import is_parameter
+from ..io.recording import Recording
+from . import electrical
+from .machine import FAULTS
+from .telling import Z
+
+
+def null(bench: Bench) -> Bench:
+    """The recalibrated nominal model: the nuisances alone, on the same recordings."""
+    null = Bench(bench.machine, bench.recordings, bench.processes)
+    null.carried, null.workers = bench.carried, bench.workers
+    null.point |= {n: bench.point[n] for n in bench.nuisances}
+    null.settle(NOTHING)
+    return null
+
+
+def shrinks(
+    bench: Bench, held_out, vectors: Mapping[str, dict], recordings: Mapping[str, Recording], found: list[dict]
+) -> dict[str, Any]:
+    """The ladder on the confirm recordings; enters what each described form closes alone."""
+    if held_out is None:
+        return {"signal": None, "features": None, "fault_vector": None}
+    ladder, explored, fit, _ = held_out
+    reading = read(fit.models, fit.search.units.values())
+    model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
+    off = {n: p.off for n, p in bench.parameters.items()}
+    base_bench = null(explored)
+    recalibrated = {**off, **base_bench.values()}
+    inserted = explored.inserted(model, fit.normal)
+    after = {**recalibrated, **inserted.values}
+    nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
+    base = ladder.blocks(recalibrated, remainders=True)
+    mine = [n for n in model.deviations if is_parameter(n)]
+    best = ladder.blocks(after, remainders=True, also=mine, inserted=inserted)
+    at_nominal = ladder.blocks(nominal, remainders=True)
+    units = {u.id: u for u in explored.units}
+    equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
+    count = rows(base)
+    at_null = base_bench.reduce(base_bench.normal(base_bench.linearise()))
+    median, middle = placebo(at_null, base, equations, len(mine))
+    signal: dict[str, float | None] = {
+        "nominal": rms(at_nominal), "recalibrated": rms(base),
+        "placebo": median, "after": rms(best), "floor": 1.0,
+    }  # fmt: skip
+    signal["closed"] = closed(rms(base), rms(best), 1.0, count)
+    features = _feature_ladder(at_nominal, base, middle, best)
+    for entry in found:
+        form = units.get(entry["unit"])
+        if form is not None and form.id in model.units:
+            own = {p.name: after[p.name] for p in form.parameters}
+            entry["closed"] = closed(rms(base), rms(ladder.blocks(recalibrated | own, also=list(own))), 1.0, count)
+    return {
+        "signal": signal,
+        "features": features,
+        "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings),
+    }
+
+
+def _feature_ladder(
+    nominal: list[White], base: list[White], placebos: list[White], best: list[White]
+) -> dict[str, float | None] | None:
+    """Resistance and back-EMF coefficient of each phase and recording less the model's, over their standard errors."""
+    found = {
+        stage: coefficients([w for w in whites if w.equation in electrical.NAMES])
+        for stage, whites in (("nominal", nominal), ("recalibrated", base), ("placebo", placebos), ("after", best))
+    }
+    count = found["recalibrated"][1]
+    if not count:
+        return None
+    ladder: dict[str, float | None] = {stage: value for stage, (value, _) in found.items()}
+    share = closed(found["recalibrated"][0], found["after"][0], 1.0, count)
+    return ladder | {"floor": 1.0, "closed": share}
+
+
+def _blocks_of(equation: str) -> tuple[str, ...]:
+    """Blocks of an equation as the catalogue names it."""
+    return ("electrical_a", "electrical_b", "electrical_c") if equation == "electrical" else (equation,)
+
+
+def _fault_ladder(
+    confirm: Sequence[str], vectors: Mapping[str, dict], recordings: Mapping[str, Recording]
+) -> dict[str, float | None] | None:
+    """Root mean square error of the fault vector over its own uncertainty, where the truth is known."""
+    errors: dict[str, list[float]] = {"before": [], "after": []}
+    for name in confirm:
+        truth = recordings[name].fault
+        if truth is None:
+            continue
+        for stage, found in errors.items():
+            for value, (component, known) in zip(truth, vectors[name][stage].items(), strict=True):
+                sd = (vectors[name]["after"][component]["high"] - vectors[name]["after"][component]["low"]) / (2.0 * Z)
+                found.append((known["value"] - float(value)) / max(sd, 1e-9))
+    if not errors["before"]:
+        return None
+    before, after = (float(np.sqrt(np.mean(np.square(e)))) for e in errors.values())
+    return {
+        "nominal": before, "recalibrated": before, "placebo": None, "after": after, "floor": 1.0,
+        "closed": closed(before, after, 1.0, len(errors["before"])),
+    }  # fmt: skip
