@@ -9,7 +9,8 @@ import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
+from math import comb, prod
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.evidence import Normal, Reduced, marginalise
 from ..diagnosis.fit import CARRYING, Bench
-from ..diagnosis.model import LISTED, Unit
+from ..diagnosis.model import LISTED, WORDS, Unit
 from ..diagnosis.search import (
     FORM_PRIOR,
     OTHER_FORM,
@@ -161,10 +162,9 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
     """Draw from the prior of the model; ``width`` multiplies every prior's standard deviation."""
     kinds = {u.id: u.kind for u in bench.units}
     listed = [u for u, k in kinds.items() if k in LISTED]
-    forms = [u for u, k in kinds.items() if k == "form"]
     chosen = [
         *rng.choice(listed, rng.choice(len(SIZE_PRIOR), p=SIZE_PRIOR), replace=False),
-        *rng.choice(forms, rng.choice(len(FORM_PRIOR), p=FORM_PRIOR), replace=False),
+        *_drawn_forms([u for u in bench.units if u.kind == "form"], rng),
         *(u for u, k in kinds.items() if k == "remainder" and rng.random() < REMAINDER_PRIOR),
     ]
     d = bench.fixed.copy()
@@ -192,6 +192,13 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
             share = (d[k] - bench.fixed[k]) / (SIZE * c.sd)
             d[bench.rest[c.extra]] = share * c.extra_sd * rng.standard_normal(len(c.extra))
     return Drawn(members, d)
+
+
+def _drawn_forms(forms: Sequence[Unit], rng: np.random.Generator) -> tuple[str, ...]:
+    """Ids of forms drawn from those of the prior's sets that are among these."""
+    sets = [s for k in range(len(FORM_PRIOR)) for s in combinations(forms, k)]
+    weights = [FORM_PRIOR[len(s)] / comb(len(WORDS), len(s)) / prod(u.among for u in s) for s in sets]
+    return tuple(u.id for u in sets[rng.choice(len(sets), p=np.array(weights) / sum(weights))])
 
 
 def _allowed(bench: LinearBench, c: Candidate, d: np.ndarray) -> np.ndarray:
