@@ -105,6 +105,8 @@ class WithForms:
         """(column, row) of a form in a block; None where it does not act there."""
         key = block.recording, block.equation, form.id, form.shape
         if key not in self._columns:
+            if getattr(self.machine, "large", False):  # of one recording at a time
+                self._columns = {k: v for k, v in self._columns.items() if k[0] == block.recording}
             if form.channel:
                 x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
                 for equation, rows in self.machine.seen_in(form.channel, block.recording, x).items():

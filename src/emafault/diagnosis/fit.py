@@ -20,6 +20,8 @@ LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 SINGLES = 3  # listed effects that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
+SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
+SPREAD = 3  # recordings that they are of at least
 STILL = 0.3  # prior standard deviations by which the point may still move
 FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
@@ -162,7 +164,16 @@ class Bench(NormalEquations):
         self.describe([f for f in self.described if f.id in likely])
 
     def _left(self) -> list[Block]:
-        return [b for n in self.recordings for b in self.machine.blocks(self.values(), n, wanted=())]
+        """Blocks at the present point, of as many recordings as a scan needs."""
+        out: list[Block] = []
+        rows = 0
+        for count, name in enumerate([*self.recordings[::2], *self.recordings[1::2]]):
+            if rows > SCANNED and count >= SPREAD:
+                break
+            blocks = self.machine.blocks(self.values(), name, wanted=())
+            rows += max(len(b.residual) for b in blocks)
+            out += blocks
+        return out
 
     def _refine(self, model: Model) -> bool:
         """Give described forms of a set, fitted at the present point, the shape that is best there; whether any
