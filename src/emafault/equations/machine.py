@@ -374,8 +374,8 @@ class ReferenceActuator:
             drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
         elif equation == "torque":  # friction, torque constant, inertia
             typical = typical_torque(rec.actuator)
-            drivers += [rec.direction, state.drive / typical, rec.acceleration * rec.actuator.inertia / typical]
-            # a change of both together would leave nothing of the equation
+            # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
+            drivers += [rec.direction, state.drive / typical, state.net / typical]
             kinds["sizes"] = {2: SHARE * typical, 3: 0.0}
         elif equation == "sensor_speed":
             drivers += [w]

@@ -49,7 +49,7 @@ class State:
     Lists are by phase. ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
     ``conducting`` mean of f over the part in which the phase is switched on, ``rise`` voltage of the inductance (V),
     ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m),
-    ``shared`` the same less that of the load (N m),
+    ``shared`` the same less that of the load (N m), ``net`` less friction as well,
     ``rotor_share`` of the inertia that turns with the rotor.
     """
 
@@ -67,6 +67,7 @@ class State:
     bus_current: np.ndarray
     drive: np.ndarray
     shared: np.ndarray
+    net: np.ndarray
     rotor_share: float
 
     def __init__(self, rec: Signals, point: Point):

@@ -40,7 +40,9 @@ def residual(state: State) -> Dual:
         inertia = inertia * m.inertia(state.p.of(effect_name(m)))
     state.rotor_share = float(np.prod([m.rotor_share(state.p.of(effect_name(m))) for m in with_hook("rotor_share")]))
     inertia = inertia * state.rotor_share
-    balance = net_torque(state) / inertia
+    net = net_torque(state)
+    state.net = np.asarray(net.value)
+    balance = net / inertia
     theta = rec.angle
     second = np.zeros(rec.size)
     second[1:-1] = (theta[2:] - 2.0 * theta[1:-1] + theta[:-2]) / rec.interval**2
