@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.closure import closed, coefficients, placebo, rms, rows
-from ..diagnosis.fit import NOTHING, Bench
+from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
+from ..diagnosis.fit import NOTHING, Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import read
 from ..diagnosis.point import is_parameter
+from ..diagnosis.search import Model
 from ..io.recording import Recording
 from . import electrical
 from .machine import FAULTS
@@ -37,12 +38,13 @@ def shrinks(
     off = {n: p.off for n, p in bench.parameters.items()}
     base_bench = null(explored)
     recalibrated = {**off, **base_bench.values()}
-    inserted = explored.inserted(model, fit.normal)
-    after = {**recalibrated, **inserted.values}
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
-    best = ladder.blocks(after, remainders=True, also=mine, inserted=inserted)
+    best, after = min(
+        (_inserted(ladder, explored, fit, m, recalibrated) for m in _with_and_without_remainders(fit, model)),
+        key=lambda found: rms(found[0]),
+    )
     at_nominal = ladder.blocks(nominal, remainders=True)
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
@@ -65,6 +67,22 @@ def shrinks(
         "features": features,
         "fault_vector": _fault_ladder(ladder.recordings, vectors, recordings),
     }
+
+
+def _with_and_without_remainders(fit: Fit, model: Model) -> list[Model]:
+    """A set, and the same without its remainders: one that does not carry over to other recordings is not inserted."""
+    kept = tuple((c.unit, c.variant) for c in model.choices if not c.unit.startswith("remainder:"))
+    return [model] if len(kept) == len(model.choices) else [model, fit.search.fit(kept)]
+
+
+def _inserted(
+    ladder: Ladder, explored: Bench, fit: Fit, model: Model, recalibrated: Mapping[str, float]
+) -> tuple[list[White], dict[str, float]]:
+    """Blocks of the confirm recordings with a set inserted, and its values."""
+    inserted = explored.inserted(model, fit.normal)
+    after = {**recalibrated, **inserted.values}
+    mine = [n for n in model.deviations if is_parameter(n)]
+    return ladder.blocks(after, remainders=True, also=mine, inserted=inserted), after
 
 
 def _feature_ladder(
