@@ -133,16 +133,20 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
     for equation, own in of.items():
         left = Left(equation, own, [carried[b.recording][equation] for b in own])
         for word, form in FORMS.items():
-            coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
-            for shape, _, driver in sorted(coarse, key=lambda c: -c[1])[: form.DRIVERS]:
-                name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
-                fine = form.fine(left, driver, shape)
-                value, best = max(
-                    ((f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in fine), key=lambda x: x[0]
-                )
-                if value > 0.0:
-                    among = best.among * places
-                    found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
+            coarse = [(form.coarse(left, d), d) for d in range(left.drivers)]
+            (shape, _), driver = max(
+                (c for c in coarse if c[0] is not None), key=lambda c: c[0][1], default=((None, 0), 0)
+            )
+            if shape is None:
+                continue
+            name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
+            fine = form.fine(left, driver, shape)
+            value, best = max(
+                ((f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in fine), key=lambda x: x[0]
+            )
+            if value > 0.0:
+                among = best.among * places
+                found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
     found.sort(key=lambda x: -x[0])
     out = [d for _, d in found][:PROPOSED]
     return [*out, *(c for d in out[:CHANNELED] for c in _elsewhere(machine, d))]

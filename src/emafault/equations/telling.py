@@ -65,7 +65,7 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
     }
     values = factor * np.array([v for v, _ in linear.values()])
     spread = abs(factor) * float(np.sqrt(np.mean([sd**2 for _, sd in linear.values()])))
-    for name, value in module.told(values, form.values).items():
+    for name, value in module.told(values).items():
         angle = name == "phase"
         width = Z * (spread / max(float(np.hypot(*values[:2])), 1e-12) if angle else spread)
         parameters[name] = {

@@ -4,7 +4,6 @@ A form adds to an equation, times one of the equation's drivers, or to a channel
 
 ALONG : the coordinate, as the verdict names it
 CHANNELS : quantities whose channel may have the form, rather than the equation
-DRIVERS : with how many of an equation's drivers it is proposed, the best first
 EACH : whether its coefficients are each recording's own
 COEFFICIENTS : a name for each of its columns
 columns(coordinates, shape) : (column, row) without the driver, of a shape by name
@@ -12,7 +11,7 @@ coarse(left, driver) : a shape by name near which most stands out of what an equ
     Bayes factor; None where the recordings cannot show the form
 fine(left, driver, shape) : shapes near that one with their standard deviations
 position(coordinates, shape, coefficients) : (row,) what its picture goes along, and ``AXIS``, that in words
-told(coefficients, shape) : what a reader wants of the coefficients: name -> value
+told(coefficients) : what a reader wants of the coefficients: name -> value
 """
 
 from types import ModuleType

@@ -8,7 +8,6 @@ from ..left import Found, Left, Shape, beside_first, of_cells, singly
 
 AXIS = "angle of the rotor (rad)"  # of its picture
 ALONG = "rotor_angle"
-DRIVERS = 1  # that it is proposed with
 EACH = False
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("depth",)
@@ -63,7 +62,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(found, float(values.max()), float(CELLS * len(WIDTHS)))]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """The depth itself."""
     return {"depth": float(values[0])}
 

@@ -9,7 +9,6 @@ from .spectrum import above, refined
 
 AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "time"
-DRIVERS = 1  # that it is proposed with
 EACH = True
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
@@ -56,7 +55,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found((("frequency", f, deviation, "Hz"),), value, max(1.0, left.longest * HIGHEST / _step(left)))]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """Amplitude: root mean square over the recordings of what each has."""
     pairs = np.asarray(values).reshape(-1, 2)
     return {"amplitude": float(np.sqrt(np.mean(np.sum(pairs**2, axis=1))))}

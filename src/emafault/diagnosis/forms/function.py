@@ -1,11 +1,7 @@
-"""A function of one coordinate: a cubic spline through six knots, constant beyond them.
-
-It vanishes where the coordinate does, or at the middle of a range without zero: a constant is a coefficient that every
-machine has.
-"""
+"""A function of one coordinate: a cubic spline through six knots, constant beyond them; its values at the knots add up
+to nothing, for a constant is a coefficient that every machine has."""
 
 from collections.abc import Mapping
-from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -16,12 +12,13 @@ from ..model import Block
 
 AXIS = "coordinate"  # of its picture
 ALONG = "function"  # the coordinate that its shape names
-DRIVERS = 2  # that it is proposed with
 EACH = False
 CHANNELS: tuple[str, ...] = ()
 KNOTS = 6
 VALUES = tuple(f"at_{k + 1}" for k in range(KNOTS))
 COEFFICIENTS = tuple(f"c_{k + 1}" for k in range(KNOTS - 1))
+#: (knot, coefficient) values that add up to nothing
+SHAPES = null_space(np.ones((1, KNOTS)))
 #: coordinate -> unit
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
 CELLS = 40  # of the range
@@ -29,22 +26,14 @@ FEWEST = 3  # temperatures that show a function of it
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(coefficient, row) splines that vanish where the function does."""
+    """(coefficient, row) splines whose values at the knots are ``SHAPES``."""
     along = tuple(COORDINATES)[int(shape["coordinate"])]
     return _splines(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
 
 
 def _splines(x, knots: np.ndarray) -> np.ndarray:
-    of = CubicSpline(knots, _vanishing(float(knots[0]), float(knots[-1])), bc_type="not-a-knot")
+    of = CubicSpline(knots, SHAPES, bc_type="not-a-knot")
     return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
-
-
-@cache
-def _vanishing(low: float, high: float) -> np.ndarray:
-    """(knot, coefficient) values at the knots of functions that vanish at zero, or at the middle of the range."""
-    at = 0.0 if low <= 0.0 <= high else 0.5 * (low + high)
-    every = CubicSpline(np.linspace(low, high, KNOTS), np.eye(KNOTS), bc_type="not-a-knot")
-    return null_space(every(at)[None])
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
@@ -83,9 +72,9 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(found, value, float(len(COORDINATES)))]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """Values at the knots."""
-    return dict(zip(VALUES, (_vanishing(shape["from"], shape["to"]) @ values).tolist(), strict=True))
+    return dict(zip(VALUES, (SHAPES @ values).tolist(), strict=True))
 
 
 def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from ..model import Block
 
 AXIS = "what has built up"  # of its picture
 ALONG = "time"
-DRIVERS = 1  # that it is proposed with
 EACH = False
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("gain",)
@@ -78,7 +77,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(found, float(values[k]), float(len(SOURCES) * len(CONSTANTS)))]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """The gain itself."""
     return {"gain": float(values[0])}
 

@@ -9,7 +9,6 @@ from .spectrum import above, refined
 
 AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "order"
-DRIVERS = 1  # that it is proposed with
 EACH = False
 CHANNELS: tuple[str, ...] = ("angle",)  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
@@ -68,7 +67,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(s, _value(left, driver, {"order": s[0][1]}), among) for s, among in tried]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """Amplitude and phase."""
     return {"amplitude": float(np.hypot(*values)), "phase": float(np.arctan2(values[1], values[0]))}
 

@@ -8,7 +8,6 @@ from ..left import Found, Left, Shape, beside_first, of_cells, singly
 
 AXIS = "time (s)"  # of its picture
 ALONG = "time"
-DRIVERS = 1  # that it is proposed with
 EACH = False
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("jump",)
@@ -47,7 +46,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found((("time", at, deviation, "s"),), float(values.max()), float(CELLS * FINER))]
 
 
-def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
+def told(values: np.ndarray) -> dict[str, float]:
     """The jump itself."""
     return {"jump": float(values[0])}
 
