@@ -95,6 +95,9 @@ class Bench(NormalEquations):
         self._describe("led")
         if self._carry_own_forms(search) or self.described != before:
             whites, normal = self._renewed()
+        return self._with_none_to_leave(whites, normal)
+
+    def _with_none_to_leave(self, whites: list[White], normal: Normal) -> tuple[list[White], Normal, Search]:
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
         for _ in range(LEAVES):
             if not self._leave_out(search, normal):
@@ -116,7 +119,7 @@ class Bench(NormalEquations):
             whites = self.linearise()
             normal = self.normal(whites)
             return whites, normal, self._search(normal)
-        return self._until_still(*self._renewed(), ROUNDS)
+        return self._with_none_to_leave(*self._renewed())
 
     def _by_what_leads(self, whites: list[White], normal: Normal, search: Search) -> tuple[list[White], Normal, Search]:
         """Search once more with the noise that the leading set leaves, until it leads by that too.
