@@ -133,12 +133,10 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
     for equation, own in of.items():
         left = Left(equation, own, [carried[b.recording][equation] for b in own])
         for word, form in FORMS.items():
-            coarse = [(form.coarse(left, d), d) for d in range(left.drivers)]
-            (shape, _), driver = max(
-                (c for c in coarse if c[0] is not None), key=lambda c: c[0][1], default=((None, 0), 0)
-            )
-            if shape is None:
+            coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
+            if not coarse:
                 continue
+            shape, _, driver = max(coarse, key=lambda c: c[1])
             name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
             fine = form.fine(left, driver, shape)
             value, best = max(

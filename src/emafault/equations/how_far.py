@@ -19,11 +19,11 @@ from .telling import Z
 
 def null(bench: Bench) -> Bench:
     """The recalibrated nominal model: the nuisances alone, on the same recordings."""
-    null = Bench(bench.machine, bench.recordings, bench.processes)
-    null.carried, null.workers = bench.carried, bench.workers
-    null.point |= {n: bench.point[n] for n in bench.nuisances}
-    null.settle(NOTHING)
-    return null
+    out = Bench(bench.machine, bench.recordings, bench.processes)
+    out.carried, out.workers = bench.carried, bench.workers
+    out.point |= {n: bench.point[n] for n in bench.nuisances}
+    out.settle(NOTHING)
+    return out
 
 
 def shrinks(
@@ -36,8 +36,8 @@ def shrinks(
     reading = read(fit.models, fit.search.units.values())
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
-    base_bench = null(explored)
-    recalibrated = {**off, **base_bench.values()}
+    nominal_unit = null(explored)
+    recalibrated = {**off, **nominal_unit.values()}
     nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
@@ -49,7 +49,7 @@ def shrinks(
     units = {u.id: u for u in explored.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
-    at_null = base_bench.reduce(base_bench.normal(base_bench.linearise()))
+    at_null = nominal_unit.reduce(nominal_unit.normal(nominal_unit.linearise()))
     median, middle = placebo(at_null, base, equations, len(mine))
     signal: dict[str, float | None] = {
         "nominal": rms(at_nominal), "recalibrated": rms(base),

@@ -11,7 +11,7 @@ from ..io.bench import read_bench
 from ..io.split import split_bench
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder
-from .corrected import write_corrected
+from .corrected import new_folder, write_corrected
 from .diagnose import diagnose
 from .handover import experiment_text
 from .page import draw, finding
@@ -43,6 +43,8 @@ def diagnose_folder(
     ------
     InputError : recordings or effects that cannot be used, or results that cannot be written
     """
+    if corrected is not None:  # refused before the work, not after it
+        new_folder(path, corrected)
     actuator = ActuatorParameters(**spec["actuator"])
     bench = read_bench(path, actuator)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
