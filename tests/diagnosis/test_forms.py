@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import Described, WithForms, proposed, refined
+from emafault.diagnosis.described import Described, WithForms, proposed, refined, scanned
 from emafault.diagnosis.forms import FORMS
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.whitening import Weights, coloured, filtered
@@ -60,7 +60,7 @@ class Machine:
         return [Block(b.recording, b.equation, b.residual.copy(), {}, b.bands, b.usable, b.coordinates)]
 
     def proposed(self):
-        return proposed(self, self.found, self.carried, "x")
+        return proposed(self, scanned(self, self.found, self.carried, "x"))
 
 
 CASES = [

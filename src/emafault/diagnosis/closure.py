@@ -8,8 +8,7 @@ import numpy as np
 from .evidence import Definite, Reduced
 from .fit import Bench, Inserted
 from .linear import White, assemble, compressed, white_rows
-from .linearisation import SETTINGS
-from .model import Block
+from .model import SETTINGS, Block
 from .point import is_parameter
 
 STEPS = 1  # of a refit of what belongs to a recording alone

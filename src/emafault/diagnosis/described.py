@@ -8,8 +8,7 @@ import numpy as np
 from .evidence import Definite
 from .forms import FORMS
 from .left import Left, gain
-from .linearisation import SETTINGS
-from .model import LISTED, WORDS, Block, Parameter, Unit, Variant
+from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
 from .search import FORM_PRIOR, OTHER_FORM, Search
 
 PROPOSED = 12  # forms that a scan proposes at most
@@ -71,12 +70,12 @@ class Described:
 class WithForms:
     """A machine whose equations have described forms too."""
 
-    def __init__(self, machine, forms: Sequence[Described]):
+    def __init__(self, machine, forms: Sequence[Described], known: "dict[tuple, np.ndarray] | None" = None):
         self.machine, self.forms = machine, tuple(forms)
         more = [f.unit(list(machine.recordings)) for f in self.forms]
         self.units = [*machine.units, *more]
         self.parameters = {**machine.parameters, **{p.name: p for u in more for p in u.parameters}}
-        self._columns: dict[tuple, np.ndarray] = {}
+        self.known: dict[tuple, np.ndarray] = {} if known is None else known
 
     def __getattr__(self, name: str):
         return getattr(self.machine, name)
@@ -104,20 +103,36 @@ class WithForms:
     def columns(self, form: Described, block: Block) -> np.ndarray | None:
         """(column, row) of a form in a block; None where it does not act there."""
         key = block.recording, block.equation, form.id, form.shape
-        if key not in self._columns:
+        if key not in self.known:
             if getattr(self.machine, "large", False):  # of one recording at a time
-                self._columns = {k: v for k, v in self._columns.items() if k[0] == block.recording}
+                for other in [k for k in self.known if k[0] != block.recording]:
+                    del self.known[other]
             if form.channel:
                 x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
                 for equation, rows in self.machine.seen_in(form.channel, block.recording, x).items():
-                    self._columns[block.recording, equation, form.id, form.shape] = rows
+                    self.known[block.recording, equation, form.id, form.shape] = rows
             else:
-                self._columns[key] = form.columns(block)
-        return self._columns.get(key)
+                self.known[key] = form.columns(block)
+        return self.known.get(key)
 
 
-def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], mark: str) -> list[Described]:
-    """Forms that stand out of what blocks leave, those most probable by themselves first.
+def with_forms(machine, forms: Sequence[Described]) -> WithForms:
+    """A machine with these forms in the place of those that it has, if any; what it knows of their columns is kept."""
+    if not isinstance(machine, WithForms):
+        return WithForms(machine, forms)
+    kept = {(f.id, f.shape) for f in forms}
+    for key in [k for k in machine.known if k[2:] not in kept]:
+        del machine.known[key]
+    return WithForms(machine.machine, forms, machine.known)
+
+
+Proposal = tuple[float, Described]  # with its approximate log odds
+
+
+def scanned(
+    machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], mark: str, part: int = 0, parts: int = 1
+) -> list[Proposal]:
+    """Forms that stand out of what blocks leave in an equation each, of one of several parts of the equations.
 
     Parameters
     ----------
@@ -129,8 +144,8 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
         if b.equation not in SETTINGS:
             of.setdefault(b.equation, []).append(b)
     places = sum(len(b[0].coordinates["drivers"]) for b in of.values())
-    found: list[tuple[float, Described]] = []
-    for equation, own in of.items():
+    found: list[Proposal] = []
+    for equation, own in list(of.items())[part::parts]:
         left = Left(equation, own, [carried[b.recording][equation] for b in own])
         for word, form in FORMS.items():
             coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
@@ -145,8 +160,12 @@ def proposed(machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], m
             if value > 0.0:
                 among = best.among * places
                 found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
-    found.sort(key=lambda x: -x[0])
-    out = [d for _, d in found][:PROPOSED]
+    return found
+
+
+def proposed(machine, found: Sequence[Proposal]) -> list[Described]:
+    """The most probable of what scans have found, each in the channels and coefficients that it may lie in as well."""
+    out = [d for _, d in sorted(found, key=lambda x: (-x[0], x[1].id))][:PROPOSED]
     return [*out, *(c for d in out[:CHANNELED] for c in _elsewhere(machine, d))]
 
 

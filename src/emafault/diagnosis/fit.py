@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .described import Described, WithForms, proposed, refined
+from .described import Described, proposed, refined, with_forms
 from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
@@ -63,7 +63,7 @@ class Bench(NormalEquations):
     settled = SETTLED
 
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
-        super().__init__(machine, recordings, processes)
+        super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
         self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
         self._inserted: dict[tuple, Inserted] = {}
 
@@ -72,9 +72,17 @@ class Bench(NormalEquations):
 
         ``begun``: a bench of some of these recordings and its fit, to go on from.
         """
-        whites, normal, search = self._explored() if begun is None else self._gone_on(*begun)
-        if self.describing:
-            whites, normal, search = self._by_what_leads(whites, normal, search)
+        if begun is not None:
+            self._go_on(*begun)
+        if begun is not None and self.describing:
+            whites, normal, search = self._by_what_leads(begun[1].models[0])
+        elif begun is not None:
+            self.settle(begun[1].models[0])
+            whites, normal, search = self._with_none_to_leave(*self._renewed())
+        else:
+            whites, normal, search = self._explored()
+            if self.describing:
+                whites, normal, search = self._by_what_leads(search.ranked()[0], normal)
         return Fit(dict(self.point), whites, self.carried, search.ranked(), normal, search)
 
     def _explored(self) -> tuple[list[White], Normal, Search]:
@@ -106,7 +114,8 @@ class Bench(NormalEquations):
             whites, normal, search = self._until_still(whites, normal, ROUNDS)
         return whites, normal, search
 
-    def _gone_on(self, bench: "Bench", fit: Fit) -> tuple[list[White], Normal, Search]:
+    def _go_on(self, bench: "Bench", fit: Fit) -> None:
+        """From where a bench's fit ended."""
         self.describe(bench.described)
         self.point |= {n: v for n, v in fit.values.items() if n in self.point}
         self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
@@ -114,48 +123,48 @@ class Bench(NormalEquations):
         # until they are fitted, what the others' fit leaves of further recordings is their noise
         as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
         self._each(as_left, [n for n in self.recordings if n not in fit.carried])
-        self.settle(fit.models[0])
-        if self.describing:  # by what leads: see ``fit``
-            whites = self.linearise()
-            normal = self.normal(whites)
-            return whites, normal, self._search(normal)
-        return self._with_none_to_leave(*self._renewed())
 
-    def _by_what_leads(self, whites: list[White], normal: Normal, search: Search) -> tuple[list[White], Normal, Search]:
+    def _by_what_leads(self, best: Model, normal: Normal | None = None) -> tuple[list[White], Normal, Search]:
         """Search once more with the noise that the leading set leaves, until it leads by that too.
 
         A full model takes from the noise whatever any cause could explain: right while causes are compared that one of
         them may be, too little noise once none of them is it.
         """
         for _ in range(ROUNDS):
-            best = search.ranked()[0]
             self.settle(best, normal)
             found, _ = self._fitted(best)
             whites = self.linearise(renew=True, leading=found)
-            normal = self.normal(whites)
-            search = self._search(normal)
-            if search.ranked()[0].units == best.units:
+            renewed = self.normal(whites)
+            search = self._search(renewed)
+            before, best, normal = best, search.ranked()[0], renewed
+            if best.units == before.units:
                 break
-        return whites, normal, search
+        return whites, renewed, search
 
     @property
     def described(self) -> tuple[Described, ...]:
         """Forms that have been proposed."""
-        return getattr(self.machine, "forms", ())
+        return self.machine.forms
 
     def describe(self, forms: Sequence[Described]) -> None:
         """Take described forms among the candidate causes."""
         if tuple(forms) == self.described:
             return
-        self.machine = WithForms(getattr(self.machine, "machine", self.machine), forms)
+        self.machine = with_forms(self.machine, forms)
         self.parameters = dict(self.machine.parameters)
         self.units = list(self.machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()} | self.point
-        self.workers = None  # another machine is theirs from the fork on
+        if self.workers is not None:
+            self.workers.tell("describe", tuple(forms))
 
     def _describe(self, mark: str) -> bool:
         """Look through what the present point leaves for forms; whether there are any."""
-        found = proposed(self.machine, self._left(), self.carried, mark) if self.describing else []
+        if not self.describing:
+            return False
+        names, workers = self._looked_through(), self._workers()
+        carried = {n: self.carried[n] for n in names}
+        parts = [(self.values(), names, carried, mark, k, workers.count) for k in range(workers.count)]
+        found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
         found = [f for f in found if not any(f.same(g) for g in self.described)]
         self.describe([*self.described, *found])
         return bool(found)
@@ -166,17 +175,21 @@ class Bench(NormalEquations):
         likely = {u for m in ranked if m.log_posterior > ranked[0].log_posterior - NEAR for u in m.units}
         self.describe([f for f in self.described if f.id in likely])
 
-    def _left(self) -> list[Block]:
-        """Blocks at the present point, of as many recordings as a scan needs."""
-        out: list[Block] = []
-        rows = 0
-        for count, name in enumerate([*self.recordings[::2], *self.recordings[1::2]]):
-            if rows > SCANNED and count >= SPREAD:
+    def _looked_through(self) -> list[str]:
+        """As many recordings as a scan needs."""
+        out: list[str] = []
+        samples = 0
+        for name in [*self.recordings[::2], *self.recordings[1::2]]:
+            if samples > SCANNED and len(out) >= SPREAD:
                 break
-            blocks = self.machine.blocks(self.values(), name, wanted=())
-            rows += max(len(b.residual) for b in blocks)
-            out += blocks
+            samples += self.machine.samples(name)
+            out.append(name)
         return out
+
+    def _left(self) -> list[Block]:
+        """Their blocks at the present point."""
+        values = self.values()
+        return [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=())]
 
     def _refine(self, model: Model) -> bool:
         """Give described forms of a set, fitted at the present point, the shape that is best there; whether any

@@ -21,12 +21,13 @@ def _done(call: tuple[str, tuple]):
 class Workers:
     """Processes that live as long as their owner; ``shared`` is theirs from the fork on.
 
-    Call n of every ``map`` goes to the same process, which may keep what it needs again. Where processes cannot be
+    Calls of one place go to the same process, which may keep what it needs again. Where processes cannot be
     forked everything is done here.
     """
 
     def __init__(self, owner: object, shared: object, processes: int):
         self.shared = shared
+        self.sent: dict = {}  # what the processes have of what changes seldom
         self.pools: list = []
         if processes > 1 and "fork" in multiprocessing.get_all_start_methods():
             context = multiprocessing.get_context("fork")
@@ -34,16 +35,29 @@ class Workers:
             for pool in self.pools:
                 weakref.finalize(owner, pool.terminate)
 
-    def map(self, method: str, arguments: Sequence[tuple]) -> list:
-        """Results of ``shared.method(*arguments)`` in order."""
+    @property
+    def count(self) -> int:
+        """Number of places at which calls are done side by side."""
+        return max(1, len(self.pools))
+
+    def tell(self, method: str, *arguments) -> None:
+        """Call ``shared.method`` in every process."""
+        self.map(method, [arguments] * self.count)
+
+    def map(self, method: str, arguments: Sequence[tuple], places: Sequence[int] | None = None) -> list:
+        """Results of ``shared.method(*arguments)`` in order; ``places``: numbers that go to one process where they are
+        the same (otherwise the calls')."""
         if not self.pools:
             return [getattr(self.shared, method)(*a) for a in arguments]
         count = len(self.pools)
+        at = [n % count for n in (range(len(arguments)) if places is None else places)]
+        mine = [[n for n, k in enumerate(at) if k == place] for place in range(count)]
         begun = [
-            pool.map_async(_done, [(method, a) for a in arguments[k::count]], chunksize=1)
-            for k, pool in enumerate(self.pools)
+            pool.map_async(_done, [(method, arguments[n]) for n in calls], chunksize=max(1, len(calls)))
+            for pool, calls in zip(self.pools, mine, strict=True)
         ]
         out: list = [None] * len(arguments)
-        for k, results in enumerate(begun):
-            out[k::count] = results.get()
+        for calls, results in zip(mine, begun, strict=True):
+            for n, found in zip(calls, results.get(), strict=True):
+                out[n] = found
         return out

@@ -120,43 +120,51 @@ def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
     return rows if weights is None else filtered(rows, weights)
 
 
-def correct(
-    white: White,
+def disturbance(
     block: Block,
     disturbed: Block,
+    names: Sequence[str],
     weights: Weights | None,
     own: Mapping[str, Mapping[str, float]] | None = None,
-) -> None:
-    """Take out of a normal matrix what the noise in the regressors adds to it, in place.
+) -> np.ndarray:
+    """(column, column) what noise adds to the products of a block's columns ``names`` and its residual, the last.
 
     To the first order a second draw of the noise changes the columns and the residual as the first did; the products
     of these changes with one another are what noise adds on average (Fuller 1987, Measurement Error Models, section
     2.2).
     """
-    last = len(white.names)
-    changes = {
-        k: disturbed.columns.get(n, 0.0) - block.columns[n] for k, n in enumerate(white.names) if n in block.columns
-    }
-    index = {n: k for k, n in enumerate(white.names)}
+    changes = {n: disturbed.columns.get(n, 0.0) - block.columns[n] for n in names if n in block.columns}
+    wanted = set(names)
     for unit, amounts in (own or {}).items():  # an own form has the noise of what it is a form of
         more = _added(disturbed, amounts) - _added(block, amounts)
         for f, function in enumerate(block.coordinates["phi"][OWN]):
             name = f"own.{unit}.{block.equation}.{f}"
-            if name in index:
-                changes[index[name]] = more * function
-    changes[last] = disturbed.residual - block.residual
-    changed = [k for k, change in changes.items() if np.any(change)]
-    raw = columns_of([changes[k] for k in changed], len(block.residual))
-    rows = _weighed(whiten(block.bands, block.usable, raw), weights)
-    noise = (rows**2).sum(axis=0)
-    power = np.diag(white.gram)[changed]
-    largest = np.where(np.array(changed) == last, np.inf, MOST_NOISE * power)
-    rows *= np.sqrt(np.where(noise > largest, largest, 1.0) / np.where(noise > largest, noise, 1.0))
+            if name in wanted:
+                changes[name] = more * function
+    changed = {n: c for n, c in changes.items() if np.any(c)}
+    used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
+    columns = [*changed.values(), disturbed.residual - block.residual]
+    some = products(block.bands, block.usable, columns, used)
+    index = {n: k for k, n in enumerate(names)}
+    k = np.array([*(index[n] for n in changed), len(names)], int)
+    gram = np.zeros((len(names) + 1, len(names) + 1))
+    gram[np.ix_(k, k)] = some
+    return gram
+
+
+def correct(white: White, noise: np.ndarray) -> None:
+    """Take out of a normal matrix what the noise in the regressors adds to it, in place.
+
+    ``noise``: products of the changes of its columns, the residual's last, as ``disturbance`` has them.
+    """
+    last = len(white.names)
+    power = np.diag(noise)
+    most = np.append(MOST_NOISE * np.diag(white.gram)[:last], np.inf)
+    scale = np.where(power > most, np.sqrt(np.maximum(most, 0.0) / np.where(power > most, power, 1.0)), 1.0)
+    taken = noise * np.outer(scale, scale)
     misfit = white.gram[-1, -1]  # the same for all hypotheses
-    taken = rows.T @ rows
-    white.gram[np.ix_(changed, changed)] -= taken
-    white.noise = np.zeros((last, last))
-    white.noise[np.ix_(changed[:-1], changed[:-1])] = taken[:-1, :-1]
+    white.gram -= taken
+    white.noise = taken[:-1, :-1]
     white.own = misfit - float(white.gram[-1, -1])
     white.gram[-1, -1] = misfit
     white.gram = _definite(white.gram)

@@ -1,15 +1,15 @@
 """One recording linearised at a point: its blocks made white, weighed and compressed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .linear import White, compressed_columns, correct, raw_columns, weights_from
-from .model import Block
+from .described import Described, Proposal, scanned, with_forms
+from .linear import White, compressed_columns, correct, disturbance, raw_columns, weights_from
+from .model import SETTINGS, Block
 from .whitening import Weights
 
-SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 KEPT = 2e8  # bytes of columns that a process keeps from a pass to the one that renews the weights
 
 
@@ -41,9 +41,14 @@ class Linearisation:
     def __init__(self, machine):
         self.machine = machine
         self.kept: dict[str, list[Block]] = {}
+        self.carried: dict[str, Carried] = {}
 
-    def compress(self, task: Task, recording: str, weights: Carried) -> tuple[list[White], Carried]:
-        """Normal matrices of a recording's blocks, and its weights from here on."""
+    def compress(self, task: Task, recording: str, given: Carried | None) -> tuple[list[White], Carried | None]:
+        """Normal matrices of a recording's blocks, and its weights from here on where they are new.
+
+        ``given``: its weights; None: as they were the last time.
+        """
+        weights = self.carried[recording] if given is None else given
         blocks = self.kept.pop(recording) if recording in self.kept else self._blocks(task, recording)
         if task.again and sum(map(_size, self.kept.values())) + _size(blocks) < KEPT:
             self.kept[recording] = blocks
@@ -64,8 +69,26 @@ class Linearisation:
             disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=set(task.wanted))
             for white, block, other in zip(out, blocks, disturbed, strict=True):
                 own = task.own if block.equation not in SETTINGS else None
-                correct(white, block, other, weights.get(block.equation), own)
-        return out, weights
+                correct(white, disturbance(block, other, white.names, weights.get(block.equation), own))
+        self.carried[recording] = weights
+        return out, weights if task.full is not None else None
+
+    def describe(self, forms: Sequence[Described]) -> None:
+        """Take these forms in the place of those before."""
+        self.machine = with_forms(self.machine, forms)
+
+    def scan(
+        self,
+        values: Mapping[str, float],
+        names: Sequence[str],
+        carried: Mapping[str, Carried],
+        mark: str,
+        part: int,
+        parts: int,
+    ) -> list[Proposal]:
+        """See ``scanned``: of recordings at a point."""
+        blocks = [b for n in names for b in self.machine.blocks(values, n, wanted=())]
+        return scanned(self.machine, blocks, carried, mark, part, parts)
 
     def _blocks(self, task: Task, recording: str) -> list[Block]:
         return self.machine.blocks(task.values, recording, wanted=set(task.wanted))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
+SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
     "lag", "crosstalk", "drift", "order", "frequency", "bump", "step_change", "function", "memory",

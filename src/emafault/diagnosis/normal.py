@@ -91,14 +91,24 @@ class NormalEquations(Point):
 
     def _each(self, task: Task, names: Sequence[str]) -> list[White]:
         """A task done for recordings, side by side where there are processes; takes over what they carry."""
+        workers = self._workers()
+        calls = []
+        for n in names:
+            carried = self.carried.setdefault(n, {})
+            calls.append((task, n, None if workers.sent.get(n) is carried else carried))
+        found = workers.map("compress", calls, [self.recordings.index(n) for n in names])
+        self.carried |= {n: renewed for n, (_, renewed) in zip(names, found, strict=True) if renewed is not None}
+        workers.sent |= {n: self.carried[n] for n in names}
+        return [w for whites, _ in found for w in whites]
+
+    def _workers(self) -> Workers:
+        """Processes that share the machine as it is at the first call."""
         if self.workers is None:
             several = min(self.processes, len(self.recordings))
             for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
             self.workers = Workers(self, Linearisation(self.machine), several)
-        found = self.workers.map("compress", [(task, n, self.carried.get(n, {})) for n in names])
-        self.carried |= {n: carried for n, (_, carried) in zip(names, found, strict=True)}
-        return [w for whites, _ in found for w in whites]
+        return self.workers
 
     def signals(self, deviations: Mapping[str, float]) -> list[tuple[str, np.ndarray, Mapping[str, np.ndarray]]]:
         """Equation, (row,) what deviations add to each block in units of its noise, and what its rows lie along."""

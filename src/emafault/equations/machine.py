@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..diagnosis.linearisation import SETTINGS
-from ..diagnosis.model import Block, Parameter, Unit, Variant
+from ..diagnosis.model import SETTINGS, Block, Parameter, Unit, Variant
 from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .dual import Dual, value_of
@@ -37,6 +36,12 @@ CHANNELS = {
     "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
     "electrical_b": ("current_b",), "electrical_c": ("current_c",),
 }  # fmt: skip
+#: equations by name, beside those of the phases
+OF_STATE = {
+    "sensor_current": sensor_current, "sensor_speed": sensor_speed, "torque": torque, "position": position, "bus": bus,
+    "control": control, "commutation": commutation,
+}  # fmt: skip
+FEWEST_EDGES = 20  # that a recording is asked about its commutations with
 SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
 SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 BACK_EMF = 2  # driver of the electrical equations: speed times the shape
@@ -197,6 +202,10 @@ class ReferenceActuator:
                 self._disturbed[name] = self.recordings[name].disturbed(1)
             self.blocks({n: p.off for n, p in self.parameters.items()}, name, wanted=())
 
+    def samples(self, name: str) -> int:
+        """Number of samples of a recording."""
+        return self.recordings[name].size
+
     def blocks(
         self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
     ) -> list[Block]:
@@ -262,41 +271,27 @@ class ReferenceActuator:
         return self._functions_of(self.recordings[name])
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
-        point = Point(values, rec.name, wanted)
-        state = State(rec, point)
-        found = []
-        for j, (name, r) in enumerate(electrical.residuals(state).items()):
-            found.append((name, r, electrical.noise_bands(state, j), electrical.usable(state, j)))
-        found.append(
-            ("sensor_current", sensor_current.residual(state), sensor_current.noise_bands(state), _not_first(rec))
-        )
-        found.append(("sensor_speed", sensor_speed.residual(state), sensor_speed.noise_bands(state), _not_first(rec)))
-        found.append(("torque", torque.residual(state), torque.noise_bands(state), torque.usable(state)))
-        found.append(("position", position.residual(state), position.noise_bands(state), _not_first(rec)))
-        if rec.bus is not None:
-            found.append(("bus", bus.residual(state), bus.noise_bands(state), _not_first(rec)))
-        found.append(("control", control.residual(state), control.noise_bands(state), control.usable(state)))
-        turning = commutation.residual(state)
-        count = np.size(turning.value)
-        if count > 20:
-            found.append(("commutation", turning, commutation.noise_bands(state), np.ones(count, bool)))
+        state = State(rec, Point(values, rec.name, wanted))
         blocks = []
-        for name, r, bands, usable in found:
-            columns = dict(r.slopes)
-            for parameter, column in self._secants(state, name, r, values).items():
-                columns[parameter] = column
-            blocks.append(
-                Block(
-                    rec.name,
-                    name,
-                    np.asarray(r.value),
-                    columns,
-                    bands,
-                    usable,
-                    self._coordinates(state, name),
-                )
-            )
+        for j, (name, r) in enumerate(electrical.residuals(state).items()):
+            blocks.append(self._block(state, name, r, electrical.noise_bands(state, j), electrical.usable(state, j)))
+        for name, equation in OF_STATE.items():
+            if equation is bus and rec.bus is None:
+                continue
+            r = equation.residual(state)
+            if equation is commutation:
+                if np.size(r.value) <= FEWEST_EDGES:
+                    continue
+                usable = np.ones(np.size(r.value), bool)
+            else:
+                usable = equation.usable(state) if hasattr(equation, "usable") else _not_first(rec)
+            blocks.append(self._block(state, name, r, equation.noise_bands(state), usable))
         return blocks
+
+    def _block(self, state: State, name: str, r: Dual, bands: list[np.ndarray], usable: np.ndarray) -> Block:
+        columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
+        along = self._coordinates(state, name)
+        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along)
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""

@@ -82,4 +82,6 @@ class State:
         out.p = point
         for name in ("current", "k", "conducting"):
             setattr(out, name, [Dual(x.value) for x in getattr(self, name)])
+        out.rec = copy(self.rec)
+        out.rec.inertia_scale = Dual(self.rec.inertia_scale.value)
         return out

@@ -70,8 +70,7 @@ def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> D
         f1, f2 = _before(at_end) if joined else trapezoid_at(low - off, r)[0], at_end
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
-        of = state.p.of(effect_name(m))
-        total = total + m.harmonics(of, high - off) - m.harmonics(of, low - off)
+        total = total + m.harmonics(state.p.of(effect_name(m)), low - off, high - off)
     return total
 
 

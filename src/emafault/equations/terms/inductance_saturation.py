@@ -12,12 +12,13 @@ def flux(p, i):
     if not (s.value or s.slopes):
         return i
     x = np.asarray(i.value)
-    q = s.value * x * x
+    square = x * x
+    cube, q = x * square, s.value * square
     if s.value <= 0.0 or np.max(q) < SERIES:
         value = x * (1.0 - q / 3.0 + q * q / 5.0)
-        by_s = x**3 * (-1.0 / 3.0 + 2.0 * q / 5.0)
+        by_s = cube * (-1.0 / 3.0 + 2.0 * q / 5.0)
     else:
         root = np.sqrt(s.value)
         value = np.arctan(root * x) / root
-        by_s = np.where(q < SERIES, -(x**3) / 3.0, (x / (1.0 + q) - value) / (2.0 * s.value))
+        by_s = np.where(q < SERIES, cube / -3.0, (x / (1.0 + q) - value) / (2.0 * s.value))
     return i.through(value, 1.0 / (1.0 + q)) + s.through(0.0, by_s)
