@@ -9,7 +9,6 @@ from scipy.special import log_ndtr
 from ..compiled import compiled
 
 MANY = 32  # rows from which on a matrix is factored along its rows
-SEVERAL = 200  # nuisances from which on those of each recording are integrated out by themselves
 RIDGES = (0.0, 1e-12, 1e-10, 1e-8)  # of a unit diagonal, the first that makes a matrix definite
 
 
@@ -73,8 +72,6 @@ def marginalise(normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.n
     The Schur complement of the nuisances in the normal matrix (van Haasteren and Vallisneri 2014, Phys. Rev. D 90
     104012, do the same for pulsar timing).
     """
-    if len(nuisances) > SEVERAL:
-        return _marginalise_each(normal, nuisances, mean, sd, fixed)
     n = np.array([normal.index[x] for x in nuisances], int)
     x = np.setdiff1d(np.arange(len(normal.names)), n)
     H, g = normal.H, normal.g
@@ -87,39 +84,6 @@ def marginalise(normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.n
     b = -(g[x] + H[np.ix_(x, n)] @ mean - Hnx.T @ solved[:, -1])
     constant = -0.5 * normal.c - g[n] @ mean - 0.5 * mean @ H[np.ix_(n, n)] @ mean
     constant += 0.5 * gn @ solved[:, -1] - factor.half_log_determinant()
-    return Reduced([normal.names[k] for k in x], 0.5 * (M + M.T), b, float(constant), fixed[x])
-
-
-def _marginalise_each(
-    normal: Normal, nuisances: list[str], mean: np.ndarray, sd: np.ndarray, fixed: np.ndarray
-) -> Reduced:
-    """The same, what belongs to one recording (``name@recording``) first, which meets nothing of another's."""
-    n = np.array([normal.index[x] for x in nuisances], int)
-    x = np.setdiff1d(np.arange(len(normal.names)), n)
-    g = normal.g + normal.H[:, n] @ mean
-    constant = -0.5 * normal.c - normal.g[n] @ mean - 0.5 * mean @ normal.H[np.ix_(n, n)] @ mean
-    groups: dict[str, list[int]] = {}
-    for k, name in enumerate(nuisances):
-        groups.setdefault(name.partition("@")[2], []).append(k)
-    common = np.array(groups.pop("", []), int)
-    rest = np.concatenate([n[common], x])
-    S, gs = normal.H[np.ix_(rest, rest)], g[rest]
-    for group in groups.values():
-        own, width = n[group], sd[group]
-        touched = np.flatnonzero(normal.H[own][:, rest].any(axis=0))
-        cross = normal.H[np.ix_(own, rest[touched])] * width[:, None]
-        factor = Definite(normal.H[np.ix_(own, own)] * np.outer(width, width) + np.eye(len(own)))
-        solved = factor.solve(np.column_stack([cross, g[own] * width]))
-        S[np.ix_(touched, touched)] -= cross.T @ solved[:, :-1]
-        gs[touched] -= cross.T @ solved[:, -1]
-        constant += 0.5 * (g[own] * width) @ solved[:, -1] - factor.half_log_determinant()
-    m, width = len(common), sd[common]
-    cross = S[:m, m:] * width[:, None]
-    factor = Definite(S[:m, :m] * np.outer(width, width) + np.eye(m))
-    solved = factor.solve(np.column_stack([cross, gs[:m] * width]))
-    M = S[m:, m:] - cross.T @ solved[:, :-1]
-    constant += 0.5 * (gs[:m] * width) @ solved[:, -1] - factor.half_log_determinant()
-    b = cross.T @ solved[:, -1] - gs[m:]
     return Reduced([normal.names[k] for k in x], 0.5 * (M + M.T), b, float(constant), fixed[x])
 
 

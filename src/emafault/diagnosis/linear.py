@@ -217,7 +217,8 @@ def _as_sure(H: np.ndarray, g: np.ndarray, noise: np.ndarray) -> tuple[np.ndarra
     if not len(noisy):
         return H, g
     U = H + noise
-    U[np.diag_indices_from(U)] += np.where(np.diag(U) > 0.0, 0.0, 1.0)
+    # along what the data say nothing of, U and N are rounding, whose ratio must not count
+    U[np.diag_indices_from(U)] += np.where(np.diag(U) > 0.0, ROUNDING * np.diag(U), 1.0)
     solved = Definite(U).solve(np.column_stack([noise[:, noisy], g]))
     inner = noise[noisy][:, noisy] - noise[noisy] @ solved[:, :-1]
     H, g = H.copy(), g.copy()

@@ -68,7 +68,7 @@ class Diagnosed:
         return next_recordings(self.bench, self.fit, self.leading, kept, self.values, effects, self.noise)
 
 
-ENOUGH = 150_000  # samples that a search begins with; what it leads to is fitted to all
+ENOUGH = 50_000  # samples that a search begins with; what it leads to is fitted to all
 FEWEST = 5  # recordings that it begins with
 
 
