@@ -27,6 +27,7 @@ from .held_out import held_to_account
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
+from .point import SEEDED
 from .quality import told
 from .signals import Signals, estimated_noise
 from .telling import EQUATION, Z
@@ -174,10 +175,10 @@ def _diagnosed(
     verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search)]
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
-    spreads = _spreads(bench, fit, best)
+    posterior = _covariance(bench, fit, best)
     after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
-    verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, spreads)
+    verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
     verdict["shrinks"] = shrinks(bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"])
     fitted = [
@@ -359,28 +360,34 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
     return out
 
 
-def _spreads(bench: Bench, fit: Fit, model: Model) -> dict[str, float]:
-    """Posterior standard deviations of the nuisances with a model's own parameters free."""
+def _covariance(bench: Bench, fit: Fit, model: Model) -> tuple[dict[str, int], np.ndarray]:
+    """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
     k = np.array([fit.normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
     A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
-    return dict(zip(names, (np.sqrt(np.diag(Definite(A).solve(np.eye(len(k))))) * sd).tolist(), strict=True))
+    return {n: k for k, n in enumerate(names)}, Definite(A).solve(np.eye(len(k))) * np.outer(sd, sd)
 
 
-def _faults(bench: Bench, recordings, before: Mapping, after: Mapping, spreads: Mapping) -> dict[str, dict]:
+def _faults(
+    bench: Bench, recordings, before: Mapping, after: Mapping, posterior: tuple[dict[str, int], np.ndarray]
+) -> dict[str, dict]:
     out: dict[str, dict] = {}
+    index, covariance = posterior
     for name in bench.recordings:
         rec = bench.machine.recordings[name]
         out[name] = {"before": {}, "after": {}}
         for component in FAULT_NAMES:
-            if component == "dT":
-                full, shift = f"dT@{name}", rec.dT_measured
-            else:
-                full, shift = (component if rec.health == "unknown" else f"{component}@{name}"), 0.0
-            sd = float(spreads.get(full, 0.0))
+            shift = rec.dT_measured if component == "dT" else 0.0
+            parts = [component if component != "dT" and rec.health == "unknown" else f"{component}@{name}"]
+            if component != "dT" and rec.health == "seeded":
+                parts.append(SEEDED + component)
+            k = [index[n] for n in parts if n in index]
+            sd = float(np.sqrt(covariance[np.ix_(k, k)].sum()))
             for stage, values in (("before", before), ("after", after)):
-                value = float(values[full]) + shift
+                value = float(sum(values[n] for n in parts)) + shift
+                if component.startswith("N") and len(parts) > 1:  # shares of the turns multiply
+                    value -= float(np.prod([values[n] for n in parts]))
                 out[name][stage][component] = {"value": value, "low": value - Z * sd, "high": value + Z * sd}
     return out
 

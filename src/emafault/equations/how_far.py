@@ -14,6 +14,7 @@ from ..diagnosis.search import Model
 from ..io.recording import Recording
 from . import electrical
 from .machine import FAULTS
+from .point import SEEDED
 from .telling import Z
 
 
@@ -38,7 +39,7 @@ def shrinks(
     off = {n: p.off for n, p in bench.parameters.items()}
     nominal_unit = null(explored)
     recalibrated = {**off, **nominal_unit.values()}
-    nominal = {n: recalibrated[n] if n.split("@")[0] in FAULTS else v for n, v in off.items()}
+    nominal = {n: recalibrated[n] if n.split("@")[0].removeprefix(SEEDED) in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(

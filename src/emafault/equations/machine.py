@@ -1,6 +1,7 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..diagnosis.model import SETTINGS, Block, Parameter, Unit, Variant
 from ..effects import EFFECTS, Effect
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .dual import Dual, value_of
-from .point import Point, State
+from .point import SEEDED, Point, State
 from .signals import REST, Signals
 from .terms import TERMS
 
@@ -124,8 +125,10 @@ class ReferenceActuator:
                 full = f"controller.edge_{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
             if rec.health == "seeded":
-                for f in FAULTS:
-                    out[f"{f}@{name}"] = _fault(f"{f}@{name}", f)
+                for f in FAULTS:  # how large a bench seeds them is not known: half of their variance is what all share
+                    common = _fault(SEEDED + f, f)
+                    out[SEEDED + f] = replace(common, sd=common.sd * np.sqrt(0.5))
+                    out[f"{f}@{name}"] = replace(common, name=f"{f}@{name}", mean=0.0, sd=common.sd * np.sqrt(0.5))
             elif rec.health == "healthy":
                 for f in FAULTS:
                     out[f"{f}@{name}"] = Parameter(f"{f}@{name}", 0.0, 0.0, 0.5 * HEALTHY, "1")

@@ -97,10 +97,10 @@ def _coefficients(state: State) -> None:
     a = rec.actuator
     state.k, state.turns = [], []
     for j in range(3):
-        N = p.own("N" + "abc"[j])
-        g = 1.0 + p.own("xi_x") * np.cos(rec.axis[j]) + p.own("xi_y") * np.sin(rec.axis[j])
-        state.turns.append(1.0 - N)
-        state.k.append(_product(state, "coefficient", rec, j) * (1.0 - N) * g * a.back_emf)
+        turns = p.turns("N" + "abc"[j])
+        g = 1.0 + p.eccentricity("xi_x") * np.cos(rec.axis[j]) + p.eccentricity("xi_y") * np.sin(rec.axis[j])
+        state.turns.append(turns)
+        state.k.append(_product(state, "coefficient", rec, j) * turns * g * a.back_emf)
 
 
 def _resistances(state: State) -> None:
