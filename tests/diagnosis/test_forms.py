@@ -88,6 +88,19 @@ def test_a_form_is_found_where_it_is(word, shape, sizes, driver):
         assert first.values["order"] == 2.0  # what turns with the rotor
 
 
+@pytest.mark.parametrize("parts", [2, 3])
+def test_a_scan_in_parts_finds_what_one_does(parts):
+    machine = Machine("order", {"order": 3.27}, (0.15, 0.1))
+    other = [Block("one", "speed", b.residual, {}, b.bands, b.usable, b.coordinates) for b in machine.found]
+    blocks = [*machine.found, *other]
+    carried = {n: {**w, "speed": w["torque"]} for n, w in machine.carried.items()}
+    whole = scanned(machine, blocks, carried, "x")
+    in_parts = [f for k in range(parts) for f in scanned(machine, blocks, carried, "x", k, parts)]
+    assert {f.equation for _, f in whole} == {"torque", "speed"}
+    assert sorted(f.id for _, f in in_parts) == sorted(f.id for _, f in whole)
+    assert proposed(machine, in_parts) == proposed(machine, whole)
+
+
 def test_noise_alone_has_no_form():
     assert Machine().proposed() == []
 

@@ -164,3 +164,25 @@ def test_controller_gains_stand_in_the_control_equation_alone(nominal):
     for block in nominal.blocks(values, "a.nc"):
         gains = [n for n in block.columns if n.startswith("controller.") and n.endswith("_gain")]
         assert bool(gains) == (block.equation == "control")
+
+
+def test_what_seeded_recordings_share_of_a_fault_is_the_same_as_their_own():
+    one, two = (recorded(seed=n, fault=FAULT, health="seeded") for n in (0, 1))
+    machine = machine_of({"a.nc": one, "b.nc": two})
+    off = {n: p.off for n, p in machine.parameters.items()}
+    own = off | {"Na@a.nc": 0.04, "Na@b.nc": 0.04, "xi_x@a.nc": 0.1, "xi_x@b.nc": 0.1}
+    shared = off | {"seeded.Na": 0.04, "seeded.xi_x": 0.1}
+    for name in ("a.nc", "b.nc"):
+        for x, y in zip(machine.blocks(own, name), machine.blocks(shared, name), strict=True):
+            assert np.allclose(x.residual, y.residual, rtol=0.0, atol=1e-12), x.equation
+            if f"Na@{name}" in x.columns:
+                assert np.allclose(x.columns[f"Na@{name}"], y.columns["seeded.Na"]), x.equation
+    fault, common = machine.parameters["Na@a.nc"], machine.parameters["seeded.Na"]
+    assert fault.sd == pytest.approx(common.sd) and np.hypot(fault.sd, common.sd) == pytest.approx(0.05)
+
+
+def test_a_healthy_recording_has_nothing_of_what_seeded_ones_share():
+    machine = machine_of({"a.nc": recorded(), "b.nc": recorded(fault=FAULT, health="seeded")})
+    off = {n: p.off for n, p in machine.parameters.items()}
+    for x, y in zip(machine.blocks(off, "a.nc"), machine.blocks(off | {"seeded.Na": 0.2}, "a.nc"), strict=True):
+        assert np.array_equal(x.residual, y.residual), x.equation

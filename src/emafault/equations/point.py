@@ -28,18 +28,6 @@ class Point:
         full = f"{name}@{self.recording}"
         return self(full) if full in self.values else self(name)
 
-    def turns(self, fault: str) -> Dual:
-        """Share of a phase's turns that a fault leaves: of this recording, times what seeded recordings have alike."""
-        return (1.0 - self.own(fault)) * (1.0 - self.alike(fault))
-
-    def eccentricity(self, fault: str) -> Dual:
-        """Static eccentricity along one axis (1): of this recording, and what seeded recordings have alike."""
-        return self.own(fault) + self.alike(fault)
-
-    def alike(self, fault: str) -> Dual:
-        """What all seeded recordings have of a fault; nothing where this recording is not one."""
-        return self(SEEDED + fault) if f"{fault}@{self.recording}" in self.values else Dual(0.0)
-
     def __call__(self, name: str) -> Dual:
         if name not in self.values:
             return Dual(0.0)

@@ -4,7 +4,7 @@ import numpy as np
 
 from .acquisition import true_currents
 from .dual import Dual, Number, value_of
-from .point import State, effect_name
+from .point import SEEDED, State, effect_name
 from .shape import trapezoid_at, trapezoid_swept
 from .terms import with_hook
 
@@ -93,14 +93,28 @@ def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:
 
 
 def _coefficients(state: State) -> None:
-    rec, p = state.rec, state.p
-    a = rec.actuator
+    rec, a = state.rec, state.rec.actuator
+    x, y = _eccentricity(state, "xi_x"), _eccentricity(state, "xi_y")
     state.k, state.turns = [], []
     for j in range(3):
-        turns = p.turns("N" + "abc"[j])
-        g = 1.0 + p.eccentricity("xi_x") * np.cos(rec.axis[j]) + p.eccentricity("xi_y") * np.sin(rec.axis[j])
+        turns = _turns(state, "N" + "abc"[j])
+        g = 1.0 + x * np.cos(rec.axis[j]) + y * np.sin(rec.axis[j])
         state.turns.append(turns)
         state.k.append(_product(state, "coefficient", rec, j) * turns * g * a.back_emf)
+
+
+def _turns(state: State, fault: str) -> Dual:
+    """Share of a phase's turns that is left, of a seeded recording by itself times what all of them have."""
+    return (1.0 - state.p.own(fault)) * (1.0 - _shared(state, fault))
+
+
+def _eccentricity(state: State, fault: str) -> Dual:
+    """Static eccentricity along one axis (1), of a seeded recording by itself and what all of them have."""
+    return state.p.own(fault) + _shared(state, fault)
+
+
+def _shared(state: State, fault: str) -> Dual:
+    return state.p(SEEDED + fault) if state.rec.health == "seeded" else Dual(0.0)
 
 
 def _resistances(state: State) -> None:
