@@ -7,12 +7,12 @@ from typing import Any
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
-from ..io.bench import read_bench
+from ..io.bench import Bench, read_bench
 from ..io.split import split_bench
 from ..reporting.retrained import section
-from ..reporting.written import EXPERIMENT, REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder
+from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, file_name, results_folder
 from .corrected import new_folder, write_corrected
-from .diagnose import diagnose
+from .diagnose import Diagnosed, diagnose
 from .handover import experiment_text
 from .page import draw, finding
 
@@ -53,18 +53,23 @@ def diagnose_folder(
     verdict = found.verdict
     verdict["warnings"] = bench.warnings
     print("\n".join(finding(verdict)), flush=True)
+    with aside(track) as tracked:
+        _write(found, bench, folder, experiment)
+        if corrected is not None:
+            undone = write_corrected(found, bench.recordings, path, corrected)
+            print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
+        print(f"written to {folder}", flush=True)
+        tracked(spec["tracking"], folder, verdict)
+    return verdict
+
+
+def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None) -> None:
+    verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
     text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
     write_text(folder / VERDICT, checked(verdict))
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)
-    if corrected is not None:
-        undone = write_corrected(found, bench.recordings, path, corrected)
-        print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
     truths = {n: r.fault for n, r in bench.recordings.items()}
     draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
-    print(f"written to {folder}", flush=True)
-    if track:
-        log_diagnosis(spec["tracking"], folder, verdict)
-    return verdict

@@ -2,7 +2,11 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from importlib import import_module
+from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +57,28 @@ def file_name(text: str) -> str:
     """Text as the name of a file and of an experiment."""
     kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
     return kept.lstrip("_-") or "bench"
+
+
+@contextmanager
+def aside(track: bool) -> Iterator[Callable[..., None]]:
+    """Gives ``log_diagnosis``, done in a process of its own, which loads what it needs meanwhile; nothing without
+    ``track``."""
+    if not track:
+        yield lambda *_: None
+        return
+    if "fork" not in get_all_start_methods():
+        yield log_diagnosis
+        return
+    with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
+        pool.submit(import_module, "mlflow")  # what comes of it shows below
+        yield lambda *arguments: _tracked(pool.submit(log_diagnosis, *arguments))
+
+
+def _tracked(logging: Future) -> None:
+    try:
+        logging.result()
+    except BrokenExecutor as error:
+        say(f"not tracked: {error}")
 
 
 def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
