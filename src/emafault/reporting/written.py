@@ -71,18 +71,28 @@ def aside(track: bool) -> Iterator[Callable[..., None]]:
         return
     with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
         pool.submit(import_module, "mlflow")  # what comes of it shows below
-        yield lambda *arguments: _tracked(pool.submit(log_diagnosis, *arguments))
+        yield lambda *arguments: _say_if_not(_awaited(pool.submit(_failure, *arguments)))
 
 
-def _tracked(logging: Future) -> None:
+def _awaited(failure: Future) -> str:
     try:
-        logging.result()
+        return failure.result()
     except BrokenExecutor as error:
-        say(f"not tracked: {error}")
+        return str(error)
+
+
+def _say_if_not(failure: str) -> None:
+    if failure:
+        say(f"not tracked: {' '.join(failure.split())[:200]}")
 
 
 def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
     """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
+    _say_if_not(_failure(tracking, folder, verdict))
+
+
+def _failure(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> str:
+    """Log it; what went wrong, or nothing."""
     from ..tracking import Entry, log_run
 
     first = verdict["which"][0]
@@ -110,4 +120,5 @@ def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[st
             uri = f"sqlite:///{results_folder() / uri.removeprefix('sqlite:///results/')}"
         log_run(uri, tracking["experiment"], entry)
     except Exception as error:
-        say(f"not tracked: {' '.join(str(error).split())[:200]}")
+        return str(error) or type(error).__name__
+    return ""
