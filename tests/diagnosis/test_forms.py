@@ -101,6 +101,16 @@ def test_a_scan_in_parts_finds_what_one_does(parts):
     assert proposed(machine, in_parts) == proposed(machine, whole)
 
 
+def test_a_recording_of_a_row_is_passed_over():
+    machine = Machine("order", {"order": 3.27}, (0.15, 0.1))
+    whole = machine.proposed()
+    b = machine.found[0]
+    along = {n: np.asarray(x)[..., :1] if n != "slow" else x for n, x in b.coordinates.items()}
+    one = Block("short", "torque", b.residual[:1], {}, [b.bands[0][:1]], b.usable[:1], along)
+    carried = {**machine.carried, "short": {"torque": Weights(b.usable[:1], np.zeros(0), np.ones(1))}}
+    assert proposed(machine, scanned(machine, [*machine.found, one], carried, "x")) == whole
+
+
 def test_noise_alone_has_no_form():
     assert Machine().proposed() == []
 

@@ -8,6 +8,7 @@ import numpy as np
 from .evidence import Definite
 from .forms import FORMS
 from .left import Left, gain
+from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
 from .search import FORM_PRIOR, OTHER_FORM, Search
 
@@ -141,7 +142,7 @@ def scanned(
     """
     of: dict[str, list[Block]] = {}
     for b in blocks:
-        if b.equation not in SETTINGS:
+        if b.equation not in SETTINGS and len(b.residual) >= FEW:
             of.setdefault(b.equation, []).append(b)
     places = sum(len(b[0].coordinates["drivers"]) for b in of.values())
     found: list[Proposal] = []

@@ -122,7 +122,7 @@ def diagnose(
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
     ladder = Ladder(every, confirm)
     named = read(all_fit.models, units, observed).named
-    models, ratios = held_to_account(all_fit, named, ladder, bench, fit)
+    models, ratios = held_to_account(every, all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
     final = read(models, units, observed)
     return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios), recordings, own)

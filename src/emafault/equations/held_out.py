@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
+from ..diagnosis.constancy import log_odds_of_change
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
@@ -19,7 +20,7 @@ CLEAR = 3.0  # nats of predictive density, by which a member has been seen to he
 
 
 def held_to_account(
-    whole: Fit, named: Sequence[str], ladder: Ladder, explored: Bench, fit: Fit
+    every: Bench, whole: Fit, named: Sequence[str], ladder: Ladder, explored: Bench, fit: Fit
 ) -> tuple[list[Model], dict[str, float]]:
     """Sets of all recordings, those less likely that hold what makes the confirm recordings worse.
 
@@ -29,6 +30,8 @@ def held_to_account(
     it loses goes to the same set with a remainder in its place: no other effect has been shown by that. What is named
     in consequence is held to account in turn. Where the explored recordings' set as a whole predicts worse than without
     its effects, each is tried by itself.
+
+    What has another size in each recording is held to account likewise: see ``constancy``.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
     it.
@@ -47,6 +50,10 @@ def held_to_account(
             if odds < _log_odds(models, effect):
                 mass = _log_mass(models, effect)
                 models += _moved(whole, models, effect, True, float(mass - odds))
+        leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
+        if any(c.unit == effect for c in leading.choices) and not every.machine.observed().get(effect):
+            change = log_odds_of_change(every, whole, leading, effect)
+            models += _moved(whole, models, effect, True, _log_mass(models, effect) + change)
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)

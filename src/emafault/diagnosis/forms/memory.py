@@ -28,7 +28,8 @@ def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
         x = (0.5 * np.asarray(coordinates["current"])) ** 2
     else:
         x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
-    share = 1.0 - np.exp(-float(np.median(np.diff(coordinates["time"]))) / constant)
+    steps = np.diff(coordinates["time"])
+    share = 1.0 - np.exp(-float(np.median(steps)) / constant) if len(steps) else 1.0
     return lfilter([share], [1.0, share - 1.0], x)
 
 

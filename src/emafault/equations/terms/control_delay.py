@@ -1,6 +1,6 @@
 """The current reference takes effect later."""
 
-SENTENCE = "the current reference takes effect late"
+SENTENCE = "the current reference takes effect late, or through a filter"
 
 
 def delay(p):

@@ -1,0 +1,93 @@
+"""Whether a unit has one size in all recordings: what a fault of the machine has, and what merely takes up something
+else that comes and goes has not.
+
+A set with the unit is compared with the same set in which the unit's parameters are drawn anew for each recording,
+about nothing rather than about a common value (random effects; Higgins, Thompson and Spiegelhalter 2009, Journal of the
+Royal Statistical Society A 172, 137).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from .evidence import log_evidence
+from .fit import Bench, Fit
+from .linear import White, assemble
+from .model import WORDS
+from .search import FORM_PRIOR, OTHER_FORM, SIZE_PRIOR, Model
+
+SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
+SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)  # of what changes over an effect's range, which is not its own
+#: log odds before the data that what is seen is no listed effect, but a coefficient that changes
+PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)) - np.log(SIZE_PRIOR[1] / SIZE_PRIOR[0]))
+
+
+def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
+    """Log posterior odds that a unit of a set has another size in each recording, against one in all.
+
+    Parameters
+    ----------
+    bench : at the point of the fit
+    model : a set that holds the unit
+    """
+    choice = next(c for c in model.choices if c.unit == unit)
+    mine = bench.names_of(replace(choice, variant=choice.variant % OTHER_FORM))
+    aliases = bench.columns()[1]
+    source = {n: aliases.get(n, n) for n in mine}
+    own = {n: [_of(unit, n, r) for r in bench.recordings] for n in mine}
+    prior = _prior(fit, model)
+    rest = [n for n in prior if n not in mine and not n.startswith(f"own.{unit}.")]
+    names = [*bench.nuisances, *rest, *mine, *(o for each in own.values() for o in each)]
+    whites = [_split(w, unit, source) for w in fit.whites]
+    reduced = bench.reduce(assemble(whites, names, {n: q for n, q in aliases.items() if n in names}))
+
+    def evidence(free: dict[str, tuple[float, float]]) -> float:
+        index = np.array([reduced.index[n] for n in free], int)
+        mean, sd = np.array([*free.values()]).T
+        return log_evidence(reduced, index, mean, sd)[0]
+
+    beside = {n: prior[n] for n in rest}
+    sizes = {n: abs(model.deviations.get(n, 0.0) - bench.prior(n)[2]) for n in mine}
+    one = {**beside, **{n: prior[n] for n in mine}}
+    nearly = one | {o: (0.0, max(SCATTER * sizes[n], 1e-12)) for n in mine for o in own[n]}
+    candidate = fit.search.candidates[unit, choice.variant % OTHER_FORM]
+    widest = dict(zip(candidate.names, candidate.sd, strict=True))
+    changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
+    constant = [evidence(one), evidence(nearly)]
+    return float(_mean(changing) - _mean(constant) + PRIOR)
+
+
+def _mean(logs: list[float]) -> float:
+    """Logarithm of the mean."""
+    return float(logsumexp(logs) - np.log(len(logs)))
+
+
+def _of(unit: str, name: str, recording: str) -> str:
+    return f"own.{unit}.{name}@{recording}"
+
+
+def _split(white: White, unit: str, source: dict[str, str]) -> White:
+    """A block with the columns of ``source`` once more, under names of its recording's own."""
+    index = {n: k for k, n in enumerate(white.names)}
+    more = [n for n, q in source.items() if q in index]
+    size = len(white.names)
+    k = np.array([*range(size), *(index[source[n]] for n in more), size], int)
+    noise = None if white.noise is None else white.noise[np.ix_(k[:-1], k[:-1])]
+    names = [*white.names, *(_of(unit, n, white.recording) for n in more)]
+    return replace(white, names=names, gram=white.gram[np.ix_(k, k)], noise=noise)
+
+
+def _prior(fit: Fit, model: Model) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of a set's columns, by name."""
+    names: Sequence[str] = fit.search.reduced.names
+    out: dict[str, tuple[float, float]] = {}
+    for c in model.choices:
+        candidate = fit.search.candidates[c.unit, c.variant]
+        out |= {
+            n: (float(m), float(s * c.width))
+            for n, m, s in zip(candidate.names, candidate.mean, candidate.sd, strict=True)
+        }
+        out |= {names[k]: (0.0, float(s)) for k, s in zip(candidate.extra, candidate.extra_sd, strict=True)}
+    return out

@@ -1,0 +1,42 @@
+"""Whether a named effect has one size in all recordings: a fault of the machine has, what changes has not."""
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.constancy import log_odds_of_change
+from emafault.diagnosis.fit import Bench
+
+from .conftest import machine_of, recorded
+
+PLANS = (("parabolic", 30.0), ("reversal", 30.0), ("sine", -20.0), ("parabolic", -20.0))
+
+
+def fitted(sizes):
+    """A bench with a spring on the shaft, of another size in each recording, at its fit; and the set with a spring."""
+    machine = machine_of(
+        {
+            f"r{n}.nc": recorded(command, {"load_spring": {"c": c}}, (0.0,) * 5 + (dT,), seed=n, theta_0=0.5 * n)
+            for n, ((command, dT), c) in enumerate(zip(PLANS, sizes, strict=True))
+        }
+    )
+    bench = Bench(machine, list(machine.recordings))
+    fit = bench.fit()
+    model = fit.search.fit((("load_spring", 0),))
+    return bench, fit, model
+
+
+def test_one_size_in_all_recordings_speaks_for_an_effect():
+    assert log_odds_of_change(*fitted([60.0] * 4), "load_spring") < -5.0
+
+
+def test_another_size_in_each_speaks_against_it():
+    assert log_odds_of_change(*fitted([60.0, -60.0, 20.0, -40.0]), "load_spring") > 5.0
+
+
+def test_recordings_that_do_not_show_an_effect_say_nothing_of_it():
+    """An effect that one recording alone shows has the odds that it had before."""
+    bench, fit, model = fitted([60.0] * 4)
+    shown = [w for w in fit.whites if w.recording == "r0.nc" or w.equation != "torque"]
+    fit.whites[:] = shown
+    assert log_odds_of_change(bench, fit, model, "load_spring") == pytest.approx(0.0, abs=6.0)
+    assert np.isfinite(model.log_posterior)
