@@ -5,20 +5,24 @@ import pytest
 
 from emafault.diagnosis.constancy import log_odds_of_change
 from emafault.diagnosis.fit import Bench
+from emafault.equations.diagnose import diagnose
 
-from .conftest import machine_of, recorded
+from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
 PLANS = (("parabolic", 30.0), ("reversal", 30.0), ("sine", -20.0), ("parabolic", -20.0))
 
 
+def bench_of(sizes):
+    """Recordings of a unit with a spring on its shaft, of these sizes (N m/rad)."""
+    return {
+        f"r{n}.nc": recorded(command, {"load_spring": {"c": c}}, (0.0,) * 5 + (dT,), seed=n, theta_0=0.5 * n)
+        for n, ((command, dT), c) in enumerate(zip(PLANS, sizes, strict=True))
+    }
+
+
 def fitted(sizes):
-    """A bench with a spring on the shaft, of another size in each recording, at its fit; and the set with a spring."""
-    machine = machine_of(
-        {
-            f"r{n}.nc": recorded(command, {"load_spring": {"c": c}}, (0.0,) * 5 + (dT,), seed=n, theta_0=0.5 * n)
-            for n, ((command, dT), c) in enumerate(zip(PLANS, sizes, strict=True))
-        }
-    )
+    """Such a bench at its fit, and the set with a spring."""
+    machine = machine_of(bench_of(sizes))
     bench = Bench(machine, list(machine.recordings))
     fit = bench.fit()
     model = fit.search.fit((("load_spring", 0),))
@@ -40,3 +44,11 @@ def test_recordings_that_do_not_show_an_effect_say_nothing_of_it():
     fit.whites[:] = shown
     assert log_odds_of_change(bench, fit, model, "load_spring") == pytest.approx(0.0, abs=6.0)
     assert np.isfinite(model.log_posterior)
+
+
+def test_what_changes_is_not_named_but_told():
+    recordings = bench_of([60.0, -60.0, 20.0, -40.0])
+    names = list(recordings)
+    verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE).verdict
+    assert "load_spring" not in verdict["which"][0]["effects"] and verdict["inclusion"]["load_spring"] < 0.9
+    assert "torque" in {e["equation"] for e in verdict["discovered"]}

@@ -122,10 +122,12 @@ def diagnose(
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
     ladder = Ladder(every, confirm)
     named = read(all_fit.models, units, observed).named
-    models, ratios = held_to_account(every, all_fit, named, ladder, bench, fit)
+    models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
     final = read(models, units, observed)
-    return _diagnosed(name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios), recordings, own)
+    return _diagnosed(
+        name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios, changes), recordings, own
+    )
 
 
 def _spread(recordings: Mapping[str, Recording], names: Sequence[str]) -> list[str]:
@@ -172,7 +174,8 @@ def _diagnosed(
     verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
-    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search)]
+    changes = held_out[4] if held_out else {}
+    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search, changes)]
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
     posterior = _covariance(bench, fit, best)
@@ -292,8 +295,18 @@ def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
     return str(found[0]["equation"]) if found else "electrical"
 
 
-def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, model: Model, search: Search) -> list[dict]:
-    """Forms that no catalogue lists, and remainders, as the verdict tells them."""
+def _discovered(
+    bench: Bench,
+    machine: ReferenceActuator,
+    reading: Reading,
+    model: Model,
+    search: Search,
+    changes: Mapping[str, float],
+) -> list[dict]:
+    """Forms that no catalogue lists, and remainders, as the verdict tells them.
+
+    ``changes``: by effect, log odds that it has another size in each recording.
+    """
     out = []
     described = {d.id: d for d in bench.described}
     for form in reading.forms:
@@ -336,10 +349,25 @@ def _discovered(bench: Bench, machine: ReferenceActuator, reading: Reading, mode
                 "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
                 "parameters": {},
                 "recordings": list(bench.recordings),
-                "sentence": f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further.",
+                "sentence": f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further."
+                + _changing(search, equation, changes),
             }
         )  # fmt: skip
     return out
+
+
+def _changing(search: Search, equation: str, changes: Mapping[str, float]) -> str:
+    """What an equation's remainder looks like in each recording, were it of one size in all."""
+    like = [
+        TERMS[e].SENTENCE
+        for e, odds in changes.items()
+        if odds > 0.0 and equation.startswith(tuple(search.units[e].equations))
+    ]
+    return (
+        f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
+        if like
+        else ""
+    )
 
 
 def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, float]) -> dict[str, dict]:

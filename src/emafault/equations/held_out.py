@@ -21,7 +21,7 @@ CLEAR = 3.0  # nats of predictive density, by which a member has been seen to he
 
 def held_to_account(
     every: Bench, whole: Fit, named: Sequence[str], ladder: Ladder, explored: Bench, fit: Fit
-) -> tuple[list[Model], dict[str, float]]:
+) -> tuple[list[Model], dict[str, float], dict[str, float]]:
     """Sets of all recordings, those less likely that hold what makes the confirm recordings worse.
 
     The explored recordings are fitted with a named effect and without; both predict the confirm recordings, frozen. One
@@ -38,10 +38,12 @@ def held_to_account(
 
     Returns
     -------
-    sets, most probable first, and log predictive ratio by effect and form
+    sets, most probable first, log predictive ratio by effect and form, and by effect the log odds that it has another
+    size in each recording
     """
     models = list(whole.models)
     ratios: dict[str, float] = {}
+    changes: dict[str, float] = {}
     account = _Account(ladder, explored, fit, named)
     for effect in _untold(models, ratios, lambda u: whole.search.units[u].kind in LISTED):
         ratios[effect] = account.ratio(effect)
@@ -52,8 +54,8 @@ def held_to_account(
                 models += _moved(whole, models, effect, True, float(mass - odds))
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
         if any(c.unit == effect for c in leading.choices) and not every.machine.observed().get(effect):
-            change = log_odds_of_change(every, whole, leading, effect)
-            models += _moved(whole, models, effect, True, _log_mass(models, effect) + change)
+            changes[effect] = log_odds_of_change(every, whole, leading, effect)
+            models += _moved(whole, models, effect, True, _log_mass(models, effect) + changes[effect])
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)
@@ -62,7 +64,7 @@ def held_to_account(
             left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
             moved = _moved(whole, models, form, left, _log_mass(models, form))
             models[:] = [*(m for m in models if form not in m.units), *moved]
-    return sorted(models, key=lambda m: -m.log_posterior), ratios
+    return sorted(models, key=lambda m: -m.log_posterior), ratios, changes
 
 
 def _untold(models: list[Model], ratios: Mapping[str, float], which: Callable[[str], bool]) -> Iterator[str]:

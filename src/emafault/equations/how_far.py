@@ -33,7 +33,7 @@ def shrinks(
     """The ladder on the confirm recordings; enters what each described form closes alone."""
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
-    ladder, explored, fit, _ = held_out
+    ladder, explored, fit, *_ = held_out
     reading = read(fit.models, fit.search.units.values())
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
