@@ -341,13 +341,14 @@ class ReferenceActuator:
         level = np.abs(rec.current).sum(axis=1) / 4.0
         t = rec.time / rec.time[-1] - 0.5
         x = rec.actuator.pole_pairs * rec.middle
+        direction = np.where(rec.moving, rec.direction, 0.0)  # at rest its sign is the noise's
         base = {
-            "direction": rec.direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
+            "direction": direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
             "rotor_angle": np.mod(rec.middle, 2 * np.pi), "angle": rec.middle, "output_angle": rec.shaft,
             "temperature": np.full(rec.size, rec.ambient),
         }  # fmt: skip
         phi = [
-            np.ones(rec.size), rec.direction, np.abs(w), w * w, level - 0.3, t,
+            np.ones(rec.size), direction, np.abs(w), w * w, level - 0.3, t,
             np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
             np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle),
             np.full(rec.size, rec.dT_measured / 50.0),
@@ -383,7 +384,7 @@ class ReferenceActuator:
         elif equation == "bus":
             drivers += [state.bus_current]
         elif equation == "position":
-            drivers += [rec.direction, rec.acceleration / 1e3]
+            drivers += [base["direction"], rec.acceleration / 1e3]
         of: Callable[[np.ndarray], np.ndarray] | None = None
         if equation == "control":
             width = control.block_length(rec)
