@@ -2,6 +2,7 @@
 
 import html
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -38,7 +39,7 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
             f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
         )
-    out += [d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"]
+    out += _left([d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"])
     left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
     for name, g in verdict["controller"].items():
         if left and name != "position_gain":
@@ -57,6 +58,25 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             else "On recordings not looked at before this closes nothing of the gap."
         )
     return out
+
+
+def _left(sentences: list[str]) -> list[str]:
+    """Sentences of remainders, those that say the same of several phases in one."""
+    of_phases = [(t, re.fullmatch(r"The electrical ([abc]) equation leaves(.*)", t)) for t in sentences]
+    phases: dict[str, list[str]] = {}
+    for _, match in of_phases:
+        if match:
+            phases.setdefault(match[2], []).append(match[1])
+    out = [
+        f"The electrical equation{'s' if len(p) > 1 else ''} of phase{'s' if len(p) > 1 else ''} "
+        f"{_listed(sorted(p))} leave{'s' if len(p) == 1 else ''}{rest}"
+        for rest, p in phases.items()
+    ]
+    return [*out, *(t for t, match in of_phases if not match)]
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), words[-1]])
 
 
 def _said(found: Mapping[str, Any]) -> str:
@@ -113,7 +133,11 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
     ]  # fmt: skip
     page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
     page.heading("Which: posterior probability")
-    page.figure("which", figures.draw_ranking(_ranked(verdict)), "Probabilities are exclusive and sum to one.")
+    about = (
+        "Probabilities are exclusive and sum to one. The gain is that of all recordings fitted together: what the "
+        "confirming recordings, or another size in each recording, speak against has lost its probability all the same."
+    )
+    page.figure("which", figures.draw_ranking(_ranked(verdict)), about)
     rows = [
         [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
         for m, e in enumerate(verdict["which"][:MOST])
