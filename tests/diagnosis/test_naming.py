@@ -49,7 +49,7 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
-def held(monkeypatch, misfit, whole, explored, named, described=()):
+def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0):
     """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
     units = {
         "load_spring": unit("load_spring", "torque"), "~order": unit("~order", "torque", kind="form"),
@@ -64,8 +64,10 @@ def held(monkeypatch, misfit, whole, explored, named, described=()):
     )  # fmt: skip
     search = SimpleNamespace(fit=lambda members: model(-2.0, *(u for u, _ in members)), units=units)
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
+    monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
+    every = SimpleNamespace(machine=SimpleNamespace(observed=dict))
     return held_out.held_to_account(
-        everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
+        every, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
         SimpleNamespace(models=explored, search=search),
     )  # fmt: skip
 
@@ -74,18 +76,27 @@ def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch
     misfit = {("load_spring",): 130.0, (): 100.0}
     whole = [model(0.0, "load_spring"), model(-50.0)]
     explored = [model(0.0, "load_spring"), model(-2.0)]
-    kept, ratios = held(monkeypatch, misfit, whole, explored, ["load_spring"])
+    kept, ratios, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": -15.0} and kept[0].units == ("remainder:torque",)
     misfit["load_spring",] = 80.0
-    kept, ratios = held(monkeypatch, misfit, whole, explored, ["load_spring"])
+    kept, ratios, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": 10.0} and kept[0].units == ("load_spring",)
+
+
+def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypatch):
+    misfit = {("load_spring",): 80.0, (): 100.0}
+    whole, explored = [model(0.0, "load_spring"), model(-50.0)], [model(0.0, "load_spring"), model(-2.0)]
+    kept, _, changes = held(monkeypatch, misfit, whole, explored, ["load_spring"], change=4.0)
+    assert changes == {"load_spring": 4.0} and kept[0].units == ("remainder:torque",)
+    named = [m for m in kept if "load_spring" in m.units]
+    assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(("after", "told"), [(99.0, False), (80.0, True)])
 def test_a_described_form_is_told_where_the_held_out_part_confirms_it(monkeypatch, after, told):
     misfit = {("~order",): after, (): 100.0}
     whole = [model(0.0, "~order"), model(-50.0)]
-    kept, ratios = held(monkeypatch, misfit, whole, [model(0.0, "~order"), model(-2.0)], [], ["~order"])
+    kept, ratios, _ = held(monkeypatch, misfit, whole, [model(0.0, "~order"), model(-2.0)], [], ["~order"])
     assert ratios["~order"] == 0.5 * (100.0 - after)
     assert ("~order" in kept[0].units) == told
     if not told:
@@ -95,5 +106,5 @@ def test_a_described_form_is_told_where_the_held_out_part_confirms_it(monkeypatc
 def test_what_is_named_in_place_of_a_name_is_held_to_account_as_well(monkeypatch):
     misfit = {("load_spring",): 130.0, (): 100.0}
     whole = [model(0.0, "load_spring"), model(-50.0)]
-    _, ratios = held(monkeypatch, misfit, whole, [model(0.0, "load_spring"), model(-2.0)], [])
+    _, ratios, _ = held(monkeypatch, misfit, whole, [model(0.0, "load_spring"), model(-2.0)], [])
     assert ratios == {"load_spring": -15.0}
