@@ -65,9 +65,8 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
     search = SimpleNamespace(fit=lambda members: model(-2.0, *(u for u, _ in members)), units=units)
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
-    every = SimpleNamespace(machine=SimpleNamespace(observed=dict))
     return held_out.held_to_account(
-        every, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
+        None, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
         SimpleNamespace(models=explored, search=search),
     )  # fmt: skip
 

@@ -1,12 +1,17 @@
 """How the page says what remains."""
 
-from emafault.equations.page import _left
+from emafault.equations.page import _remainders
 
 NOISE = " more than noise, not described further."
 
 
+def left(equation, what):
+    """An entry of the verdict for what an equation leaves."""
+    return {"equation": equation, "sentence": f"The {equation.replace('_', ' ')} equation leaves{what}"}
+
+
 def test_what_is_said_of_several_phases_is_said_once():
-    said = _left([f"The electrical {j} equation leaves{NOISE}" for j in "abc"] + [f"The torque equation leaves{NOISE}"])
+    said = _remainders([*(left(f"electrical_{j}", NOISE) for j in "abc"), left("torque", NOISE)])
     assert said == [
         f"The electrical equations of phases a, b and c leave{NOISE}",
         f"The torque equation leaves{NOISE}",
@@ -15,7 +20,7 @@ def test_what_is_said_of_several_phases_is_said_once():
 
 def test_phases_that_differ_keep_their_own_sentences():
     other = " more than noise. In each recording by itself it looks as if the motor cogs, by another amount each time."
-    said = _left([f"The electrical a equation leaves{NOISE}", f"The electrical b equation leaves{other}"])
+    said = _remainders([left("electrical_a", NOISE), left("electrical_b", other)])
     assert said == [
         f"The electrical equation of phase a leaves{NOISE}",
         f"The electrical equation of phase b leaves{other}",

@@ -1,8 +1,8 @@
 """Whether a unit has one size in all recordings: what a fault of the machine has, and what merely takes up something
 else that comes and goes has not.
 
-A set with the unit is compared with the same set in which the unit's parameters are drawn anew for each recording,
-about nothing rather than about a common value (random effects; Higgins, Thompson and Spiegelhalter 2009, Journal of the
+A set with the unit is compared with the same set in which the unit's parameters are random effects of the recordings:
+drawn anew for each, with zero mean instead of a common one (Higgins, Thompson and Spiegelhalter 2009, Journal of the
 Royal Statistical Society A 172, 137).
 """
 
@@ -19,13 +19,16 @@ from .model import WORDS
 from .search import FORM_PRIOR, OTHER_FORM, SIZE_PRIOR, Model
 
 SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
-SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)  # of what changes over an effect's range, which is not its own
+#: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes
+SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 #: log odds before the data that what is seen is no listed effect, but a coefficient that changes
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)) - np.log(SIZE_PRIOR[1] / SIZE_PRIOR[0]))
 
 
 def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
     """Log posterior odds that a unit of a set has another size in each recording, against one in all.
+
+    The prior's sides and the number of its widths, which the search counts, are left out of both.
 
     Parameters
     ----------
@@ -56,10 +59,10 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     widest = dict(zip(candidate.names, candidate.sd, strict=True))
     changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
     constant = [evidence(one), evidence(nearly)]
-    return float(_mean(changing) - _mean(constant) + PRIOR)
+    return float(_log_mean(changing) - _log_mean(constant) + PRIOR)
 
 
-def _mean(logs: list[float]) -> float:
+def _log_mean(logs: list[float]) -> float:
     """Logarithm of the mean."""
     return float(logsumexp(logs) - np.log(len(logs)))
 

@@ -27,7 +27,7 @@ class Workers:
 
     def __init__(self, owner: object, shared: object, processes: int):
         self.shared = shared
-        self.sent: dict = {}  # what the processes have of what changes seldom
+        self.sent: dict = {}  # by name, what the processes keep, so that it is not sent again
         self.pools: list = []
         if processes > 1 and "fork" in multiprocessing.get_all_start_methods():
             context = multiprocessing.get_context("fork")

@@ -23,7 +23,7 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
 from . import telling
-from .held_out import held_to_account
+from .held_out import HeldOut, held_to_account
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
@@ -126,7 +126,7 @@ def diagnose(
     all_fit = replace(all_fit, models=models)
     final = read(models, units, observed)
     return _diagnosed(
-        name, split, whole, every, all_fit, final, sealed, (ladder, bench, fit, ratios, changes), recordings, own
+        name, split, whole, every, all_fit, final, sealed, HeldOut(ladder, bench, fit, ratios, changes), recordings, own
     )
 
 
@@ -174,7 +174,7 @@ def _diagnosed(
     verdict["which"] = _which(bench, machine, reading, found, fit.search)
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
-    changes = held_out[4] if held_out else {}
+    changes = held_out.changes if held_out else {}
     verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search, changes)]
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
@@ -192,7 +192,7 @@ def _diagnosed(
     before = _simulator(bench, before_point, ())
     verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if fitted else before}
     if held_out is not None:
-        verdict["held_out"] = {e: round(r, 3) for e, r in held_out[3].items()}
+        verdict["held_out"] = {e: round(r, 3) for e, r in held_out.ratios.items()}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
     return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)

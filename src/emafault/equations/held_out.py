@@ -1,7 +1,7 @@
 """Whether what was named holds on the recordings that took no part in naming it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -17,6 +17,21 @@ from ..diagnosis.search import NEAR, Model, inclusion
 
 CLEAR = 3.0  # nats of predictive density, by which a member has been seen to help or to harm (Kass and Raftery 1995,
 # JASA 90, 773)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The fit to the explored recordings, the ladder that it stands on with the others, and what these say of names.
+
+    ``ratios``: log predictive ratio by effect and form; ``changes``: by effect, log odds that it has another size in
+    each recording.
+    """
+
+    ladder: Ladder
+    explored: Bench
+    fit: Fit
+    ratios: Mapping[str, float]
+    changes: Mapping[str, float]
 
 
 def held_to_account(
@@ -53,9 +68,8 @@ def held_to_account(
                 mass = _log_mass(models, effect)
                 models += _moved(whole, models, effect, True, float(mass - odds))
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
-        if any(c.unit == effect for c in leading.choices) and not every.machine.observed().get(effect):
-            changes[effect] = log_odds_of_change(every, whole, leading, effect)
-            models += _moved(whole, models, effect, True, _log_mass(models, effect) + changes[effect])
+        changes[effect] = log_odds_of_change(every, whole, leading, effect)
+        models += _moved(whole, models, effect, True, _log_mass(models, effect) + changes[effect])
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)

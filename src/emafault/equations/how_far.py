@@ -13,6 +13,7 @@ from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..io.recording import Recording
 from . import electrical
+from .held_out import HeldOut
 from .machine import FAULTS
 from .point import SEEDED
 from .telling import Z
@@ -28,12 +29,16 @@ def null(bench: Bench) -> Bench:
 
 
 def shrinks(
-    bench: Bench, held_out, vectors: Mapping[str, dict], recordings: Mapping[str, Recording], found: list[dict]
+    bench: Bench,
+    held_out: HeldOut | None,
+    vectors: Mapping[str, dict],
+    recordings: Mapping[str, Recording],
+    found: list[dict],
 ) -> dict[str, Any]:
     """The ladder on the confirm recordings; enters what each described form closes alone."""
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
-    ladder, explored, fit, *_ = held_out
+    ladder, explored, fit = held_out.ladder, held_out.explored, held_out.fit
     reading = read(fit.models, fit.search.units.values())
     model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     off = {n: p.off for n, p in bench.parameters.items()}

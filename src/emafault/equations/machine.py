@@ -17,6 +17,7 @@ from .terms import TERMS
 
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
+SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
@@ -125,10 +126,11 @@ class ReferenceActuator:
                 full = f"controller.edge_{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
             if rec.health == "seeded":
-                for f in FAULTS:  # how large a bench seeds them is not known: half of their variance is what all share
+                for f in FAULTS:  # how large a bench seeds them is not known beforehand
                     common = _fault(SEEDED + f, f)
-                    out[SEEDED + f] = replace(common, sd=common.sd * np.sqrt(0.5))
-                    out[f"{f}@{name}"] = replace(common, name=f"{f}@{name}", mean=0.0, sd=common.sd * np.sqrt(0.5))
+                    out[SEEDED + f] = replace(common, sd=common.sd * np.sqrt(SHARED))
+                    own = common.sd * np.sqrt(1.0 - SHARED)
+                    out[f"{f}@{name}"] = replace(common, name=f"{f}@{name}", mean=0.0, sd=own)
             elif rec.health == "healthy":
                 for f in FAULTS:
                     out[f"{f}@{name}"] = Parameter(f"{f}@{name}", 0.0, 0.0, 0.5 * HEALTHY, "1")

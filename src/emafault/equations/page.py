@@ -2,14 +2,14 @@
 
 import html
 import json
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..faults import FAULT_NAMES
 from ..reporting.page import Page
 from ..reporting.retrained import MARKS
 from .diagnose import TELLING, TOLD
+from .electrical import NAMES
 from .terms import TERMS
 
 SHOWN = 4  # fault vectors in the picture
@@ -39,7 +39,7 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
             f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
         )
-    out += _left([d["sentence"] for d in verdict["discovered"] if d["form"] == "remainder"])
+    out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
     left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
     for name, g in verdict["controller"].items():
         if left and name != "position_gain":
@@ -60,22 +60,26 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _left(sentences: list[str]) -> list[str]:
-    """Sentences of remainders, those that say the same of several phases in one."""
-    of_phases = [(t, re.fullmatch(r"The electrical ([abc]) equation leaves(.*)", t)) for t in sentences]
+def _remainders(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Their sentences, those that say the same of several phases in one."""
     phases: dict[str, list[str]] = {}
-    for _, match in of_phases:
-        if match:
-            phases.setdefault(match[2], []).append(match[1])
-    out = [
-        f"The electrical equation{'s' if len(p) > 1 else ''} of phase{'s' if len(p) > 1 else ''} "
-        f"{_listed(sorted(p))} leave{'s' if len(p) == 1 else ''}{rest}"
-        for rest, p in phases.items()
+    rest = []
+    for d in found:
+        if d["equation"] in NAMES:
+            phases.setdefault(d["sentence"].partition(" leaves ")[2], []).append(d["equation"][-1])
+        else:
+            rest.append(str(d["sentence"]))
+    said = [
+        f"The electrical equations of phases {_listed(sorted(p))} leave {what}"
+        if len(p) > 1
+        else f"The electrical equation of phase {p[0]} leaves {what}"
+        for what, p in phases.items()
     ]
-    return [*out, *(t for t, match in of_phases if not match)]
+    return [*said, *rest]
 
 
 def _listed(words: list[str]) -> str:
+    """Words with commas and an "and"."""
     return " and ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), words[-1]])
 
 
