@@ -131,13 +131,20 @@ Proposal = tuple[float, Described]  # with its approximate log odds
 
 
 def scanned(
-    machine, blocks: Sequence[Block], carried: Mapping[str, Mapping], mark: str, part: int = 0, parts: int = 1
+    machine,
+    blocks: Sequence[Block],
+    carried: Mapping[str, Mapping],
+    free: Mapping[str, tuple[float, float]],
+    mark: str,
+    part: int = 0,
+    parts: int = 1,
 ) -> list[Proposal]:
     """Forms that stand out of what blocks leave in an equation each, of one of several parts of the equations.
 
     Parameters
     ----------
     carried : by recording and equation, the weights of its rows
+    free : what is free beside a form, by name of its column: mean and standard deviation of its deviation
     mark : of this scan, in the ids of what it proposes
     """
     of: dict[str, list[Block]] = {}
@@ -147,7 +154,7 @@ def scanned(
     places = sum(len(b[0].coordinates["drivers"]) for b in of.values())
     found: list[Proposal] = []
     for equation, own in list(of.items())[part::parts]:
-        left = Left(equation, own, [carried[b.recording][equation] for b in own])
+        left = Left(equation, own, [carried[b.recording][equation] for b in own], free)
         for word, form in FORMS.items():
             coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
             if not coarse:
@@ -195,25 +202,37 @@ def _elsewhere(machine, form: Described) -> list[Described]:
     return out
 
 
-def refined(machine: WithForms, form: Described, blocks: Sequence[Block], carried, values) -> Described:
+def refined(
+    machine: WithForms,
+    form: Described,
+    blocks: Sequence[Block],
+    carried: Mapping[str, Mapping],
+    values: Mapping[str, float],
+    free: Mapping[str, tuple[float, float]],
+) -> Described:
     """A form with the shape that explains most of what is left with it out, near the one that it has.
 
     Parameters
     ----------
     blocks : those at the point that ``values`` has, the form's own coefficients among them
     carried : by recording and equation, the weights of its rows
+    free : what is free beside it, see ``scanned``
     """
     own = without(machine, form, [b for b in blocks if b.equation == form.equation], values)
     if not own:  # a channel's: its columns are differences of all equations, too dear to look around
         return form
-    left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own])
+    mine = {n for b in own for n in form.names(b.recording)}
+    beside = {n: q for n, q in free.items() if n not in mine}
+    left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own], beside)
     module = FORMS[form.word]
 
     def value(at: Described) -> float:
-        parts = left.each(lambda b: module.columns(b.coordinates, at.values), at.driver)
+        def columns(b: Block) -> np.ndarray:
+            return module.columns(b.coordinates, at.values)
+
         if module.EACH:
-            return sum(gain(*p) for p in parts)
-        return gain(np.sum([g for g, _ in parts], axis=0), np.sum([G for _, G in parts], axis=0))
+            return sum(gain(*p) for p in left.each(columns, at.driver))
+        return gain(*left.products(columns, at.driver))
 
     best = value(form)
     for _ in range(REFINED):

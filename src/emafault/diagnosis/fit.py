@@ -9,7 +9,7 @@ from .described import Described, proposed, refined, with_forms
 from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
-from .model import LISTED, Block
+from .model import LISTED
 from .normal import NormalEquations
 from .point import is_parameter
 from .search import NEAR, OTHER_FORM, Model, Search
@@ -163,11 +163,16 @@ class Bench(NormalEquations):
             return False
         names, workers = self._looked_through(), self._workers()
         carried = {n: self.carried[n] for n in names}
-        parts = [(self.values(), names, carried, mark, k, workers.count) for k in range(workers.count)]
+        parts = [(self.values(), names, carried, self._free(), mark, k, workers.count) for k in range(workers.count)]
         found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
         found = [f for f in found if not any(f.same(g) for g in self.described)]
         self.describe([*self.described, *found])
         return bool(found)
+
+    def _free(self) -> dict[str, tuple[float, float]]:
+        """What is free at the present point: nuisances and parameters of the units that act, by name of a column."""
+        names = [p.name for u in self.units if u.id in self.on for v in self.active(u) for p in v.parameters]
+        return self._full_prior(names, self.columns()[1])
 
     def _keep_likely(self, search: Search) -> None:
         """Let go of described forms that no likely set has."""
@@ -186,19 +191,15 @@ class Bench(NormalEquations):
             out.append(name)
         return out
 
-    def _left(self) -> list[Block]:
-        """Their blocks at the present point."""
-        values = self.values()
-        return [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=())]
-
     def _refine(self, model: Model) -> bool:
         """Give described forms of a set, fitted at the present point, the shape that is best there; whether any
         changes."""
         mine = [f for f in self.described if f.id in model.units]
         if not mine:
             return False
-        blocks = self._left()
-        better = {f.id: refined(self.machine, f, blocks, self.carried, self.point) for f in mine}
+        values, free = self.values(), self._free()
+        blocks = [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=set(free))]
+        better = {f.id: refined(self.machine, f, blocks, self.carried, self.point, free) for f in mine}
         before = self.described
         self.describe([better.get(f.id, f) for f in before])
         return self.described != before

@@ -4,11 +4,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
+from ..compiled import compiled
 from .evidence import Definite
+from .linear import ROUNDING
 from .model import Block
 from .whitening import Weights, factored, substituted, substituted_back
 
+APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
 Shape = Mapping[str, float]
 Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
 
@@ -27,9 +31,19 @@ class Found:
 
 
 class Left:
-    """An equation's blocks with what they leave, divided by the noise's covariance."""
+    """An equation's blocks with what they leave, divided by the noise's covariance.
 
-    def __init__(self, equation: str, blocks: Sequence[Block], weights: Sequence[Weights]):
+    ``free``: by name of a block's column, mean and standard deviation of what it may deviate by from the present point:
+    scores and informations are those with these marginalised.
+    """
+
+    def __init__(
+        self,
+        equation: str,
+        blocks: Sequence[Block],
+        weights: Sequence[Weights],
+        free: Mapping[str, tuple[float, float]] | None = None,
+    ):
         self.equation, self.blocks, self.weights = equation, list(blocks), list(weights)
         self.factors = [factored(b.bands, b.usable) for b in self.blocks]
         self.white = [
@@ -48,6 +62,35 @@ class Left:
                 [self._white(k, np.ones((len(b.residual), 1)))[:, 0] for k, b in enumerate(self.blocks)], strict=True,
             )
         ]  # fmt: skip
+        self._take_out(free or {})
+
+    def _take_out(self, free: Mapping[str, tuple[float, float]]) -> None:
+        names = [n for n in free if any(n in b.columns for b in self.blocks)]
+        index = {n: k for k, n in enumerate(names)}
+        prior = np.array([free[n] for n in names]).reshape(len(names), 2)
+        #: of each block, places of its own among all that are free, and their columns (column, row)
+        self.own: list[tuple[np.ndarray, np.ndarray]] = []
+        for b in self.blocks:
+            mine = [n for n in names if n in b.columns]
+            rows = np.empty((len(mine), len(b.residual)))
+            for row, n in zip(rows, mine, strict=True):
+                row[:] = -np.asarray(b.columns[n])
+            self.own.append((np.array([index[n] for n in mine], int), rows))
+        self.own_white = [self._white(k, np.ascontiguousarray(rows.T)) for k, (_, rows) in enumerate(self.own)]
+        right = prior[:, 0] / prior[:, 1] ** 2
+        exact, slow = np.diag(1.0 / prior[:, 1] ** 2), np.diag(1.0 / prior[:, 1] ** 2)
+        g, g_slow = right.copy(), right.copy()
+        for k, (at, rows) in enumerate(self.own):
+            exact[np.ix_(at, at)] += self.own_white[k].T @ self.own_white[k]
+            slow[np.ix_(at, at)] += (rows * self.known[k]) @ rows.T
+            g[at] += self.own_white[k].T @ self.white[k]
+            g_slow[at] += rows @ self.weighed[k]
+        self._exact, self._slow = _Free(exact, g), _Free(slow, g_slow)
+        #: of each recording by itself
+        self._alone = [
+            _Free(np.diag(1.0 / prior[at, 1] ** 2) + own.T @ own, right[at] + own.T @ white)
+            for (at, _), own, white in zip(self.own, self.own_white, self.white, strict=True)
+        ]
 
     def _white(self, k: int, rows: np.ndarray) -> np.ndarray:
         """(row, column) of a block divided by its noise, in place; rows not used become zero."""
@@ -71,29 +114,95 @@ class Left:
         power = np.mean([np.mean(np.square(b.coordinates["drivers"][driver])) for b in self.blocks])
         return float(noise / np.sqrt(max(power, 1e-24)))
 
-    def cells(self, cell: Callable[[Block], np.ndarray], count: int, driver: int) -> tuple[np.ndarray, np.ndarray]:
-        """Score and, as of slow columns, information (cell,) of a driver in each cell of the rows."""
-        g, power = np.zeros(count), np.zeros(count)
-        for b, weighed, known in zip(self.blocks, self.weighed, self.known, strict=True):
+    def cells(self, cell: Callable[[Block], np.ndarray], count: int, driver: int) -> "Scored":
+        """Score and, as of slow columns, information of a driver in each cell of the rows."""
+        g, power, cross = np.zeros(count), np.zeros(count), np.zeros((len(self._slow), count))
+        for b, weighed, known, (own, rows) in zip(self.blocks, self.weighed, self.known, self.own, strict=True):
             d = np.asarray(b.coordinates["drivers"][driver])
             at = np.clip(cell(b), 0, count - 1)
             g += np.bincount(at, weighed * d, count)
             power += np.bincount(at, known * d * d, count)
-        return g, power
+            cross[own] += _binned(at, known * d, rows, count)
+        return Scored(g, power, cross, self._slow)
 
     def products(self, columns: Columns, driver: int) -> tuple[np.ndarray, np.ndarray]:
         """Score (column,) and information (column, column) of columns times a driver over all recordings."""
-        parts = self.each(columns, driver)
-        return np.sum([g for g, _ in parts], axis=0), np.sum([G for _, G in parts], axis=0)
+        return self._added(columns, driver, False)
+
+    def slowly(self, columns: Columns, driver: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same, as of slow columns."""
+        return self._added(columns, driver, True)
+
+    def _added(self, columns: Columns, driver: int, slow: bool) -> tuple[np.ndarray, np.ndarray]:
+        free = self._slow if slow else self._exact
+        g: np.ndarray | float = 0.0
+        G: np.ndarray | float = 0.0
+        cross = None
+        for k, b in enumerate(self.blocks):
+            rows = np.asarray(columns(b) * np.asarray(b.coordinates["drivers"][driver]), float)
+            if slow:
+                weighed = rows * self.known[k]
+                g, G, with_own = g + rows @ self.weighed[k], G + weighed @ rows.T, self.own[k][1] @ weighed.T
+            else:
+                white = self._white(k, np.ascontiguousarray(rows.T))
+                g, G, with_own = g + white.T @ self.white[k], G + white.T @ white, self.own_white[k].T @ white
+            cross = np.zeros((len(free), len(rows))) if cross is None else cross
+            cross[self.own[k][0]] += with_own
+        assert cross is not None
+        return free.taken_out(np.asarray(g), np.asarray(G), cross)
 
     def each(self, columns: Columns, driver: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The same of each recording."""
+        """The same of each recording by itself."""
         out = []
         for k, b in enumerate(self.blocks):
             rows = np.ascontiguousarray((columns(b) * np.asarray(b.coordinates["drivers"][driver])).T, float)
             rows = self._white(k, rows)
-            out.append((rows.T @ self.white[k], rows.T @ rows))
+            out.append(self._alone[k].taken_out(rows.T @ self.white[k], rows.T @ rows, self.own_white[k].T @ rows))
         return out
+
+
+class _Free:
+    """What is free beside a form: its information and score, to be taken out of a form's."""
+
+    def __init__(self, information: np.ndarray, score: np.ndarray):
+        self.scale = 1.0 / np.sqrt(np.diag(information))
+        self.lower = np.linalg.cholesky(information * np.outer(self.scale, self.scale) + ROUNDING * np.eye(len(score)))
+        self.score = self._through(score)
+
+    def __len__(self) -> int:
+        return len(self.score)
+
+    def _through(self, x: np.ndarray) -> np.ndarray:
+        if not len(self.scale):
+            return x
+        return solve_triangular(self.lower, (x.T * self.scale).T, lower=True, check_finite=False)
+
+    def taken_out(self, g: np.ndarray, G: np.ndarray, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Score and information of columns with what is free marginalised; ``cross`` (free, column)."""
+        X = self._through(cross)
+        found = G - X.T @ X
+        apart = np.diag(found) > APART * np.diag(G)
+        return np.where(apart, g - X.T @ self.score, 0.0), np.where(np.outer(apart, apart), found, np.diag(np.diag(G)))
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Score and information (cell,) of a driver in cells, and that which each shares with what is free (free, cell)."""
+
+    g: np.ndarray
+    power: np.ndarray
+    cross: np.ndarray
+    free: _Free
+
+
+@compiled
+def _binned(at, weight, rows, count):
+    """(row, cell) sums of weighed rows over cells."""
+    out = np.zeros((len(rows), count))
+    for q in range(len(rows)):
+        for k in range(len(at)):
+            out[q, at[k]] += weight[k] * rows[q, k]
+    return out
 
 
 def gain(g: np.ndarray, G: np.ndarray) -> float:
@@ -124,11 +233,11 @@ def singly(g: np.ndarray, G: np.ndarray) -> np.ndarray:
     return _less_width(found, 1)
 
 
-def of_cells(columns: np.ndarray, g: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def of_cells(columns: np.ndarray, cells: Scored) -> tuple[np.ndarray, np.ndarray]:
     """Score and information of columns (column, cell) that are constant in each cell, a constant of all apart."""
-    shares = columns @ power / max(power.sum(), 1e-300)
+    shares = columns @ cells.power / max(cells.power.sum(), 1e-300)
     columns = columns - shares[:, None]
-    return columns @ g, (columns * power) @ columns.T
+    return cells.free.taken_out(columns @ cells.g, (columns * cells.power) @ columns.T, cells.cross @ columns.T)
 
 
 def without(g: np.ndarray, G: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -82,13 +82,14 @@ class Linearisation:
         values: Mapping[str, float],
         names: Sequence[str],
         carried: Mapping[str, Carried],
+        free: Mapping[str, tuple[float, float]],
         mark: str,
         part: int,
         parts: int,
     ) -> list[Proposal]:
         """See ``scanned``: of recordings at a point."""
-        blocks = [b for n in names for b in self.machine.blocks(values, n, wanted=())]
-        return scanned(self.machine, blocks, carried, mark, part, parts)
+        blocks = [b for n in names for b in self.machine.blocks(values, n, wanted=set(free))]
+        return scanned(self.machine, blocks, carried, free, mark, part, parts)
 
     def _blocks(self, task: Task, recording: str) -> list[Block]:
         return self.machine.blocks(task.values, recording, wanted=set(task.wanted))

@@ -6,6 +6,10 @@ Effects whose inclusions reach it only together, one standing in for the other i
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
+
+import numpy as np
+from scipy.special import expit
 
 from .model import LISTED, Unit
 from .search import Model, posterior
@@ -33,11 +37,18 @@ class Reading:
 
 
 def read(
-    models: Sequence[Model], units: Iterable[Unit], observed: Sequence[str] = (), one_equation: bool = True
+    models: Sequence[Model],
+    units: Iterable[Unit],
+    observed: Sequence[str] = (),
+    one_equation: bool = True,
+    counted: bool = False,
+    wandering: Mapping[str, float] = MappingProxyType({}),
 ) -> Reading:
     """Read a posterior; effects ``observed`` for certain belong to every set.
 
-    ``one_equation``: whether only effects that act in a common equation may be a group.
+    ``one_equation``: whether only effects that act in a common equation may be a group; ``counted``: whether the
+    recordings show faults of their measuring chain without a model; ``wandering``: by equation, log odds that what is
+    left in it wanders, which is a remainder of it that no column shows.
     """
     units = list(units)
     kind = {u.id: u.kind for u in units}
@@ -46,6 +57,8 @@ def read(
     masses: dict[tuple[str, ...], float] = {}
     leading: dict[tuple[str, ...], Model] = {}
     empty = unknown = 0.0
+    wanders = {f"remainder:{e}": float(expit(odds)) for e, odds in wandering.items()}
+    steady = float(np.prod([1.0 - p for r, p in wanders.items() if r not in OWN_BUSINESS]))
     for model, w in zip(models, weights, strict=True):
         listed = tuple(sorted({*observed, *(u for u in model.units if kind.get(u) in LISTED)}))
         for u in model.units:
@@ -56,7 +69,10 @@ def read(
         elif any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units):
             unknown += float(w)
         else:
-            empty += float(w)
+            empty += float(w) * steady
+            unknown += float(w) * (1.0 - steady)
+    for left, p in wanders.items():
+        inclusion[left] = 1.0 - (1.0 - inclusion.get(left, 0.0)) * (1.0 - p)
     inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
@@ -65,12 +81,12 @@ def read(
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
     nothing = max(0.0, empty)
-    beside = [r for r in remainders if r not in OWN_BUSINESS]
+    beside = counted or forms or [r for r in remainders if r not in OWN_BUSINESS]
     if named and not groups:
-        verdict = "partly" if forms or beside else "explained"
+        verdict = "partly" if beside else "explained"
     elif groups:
-        verdict = "partly" if forms or beside else "group"
-    elif forms:
+        verdict = "partly" if beside else "group"
+    elif forms or (counted and nothing >= 0.5):
         verdict = "described"
     elif nothing >= 0.5:
         verdict = "no_gap"

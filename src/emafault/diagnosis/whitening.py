@@ -137,13 +137,15 @@ class Weights:
     its variance (row,).
 
     ``wander``: share of each innovation by which the noise's slow level follows it, of a local level model (Durbin and
-    Koopman 2012, Time Series Analysis by State Space Methods, section 2.2); 0: none.
+    Koopman 2012, Time Series Analysis by State Space Methods, section 2.2); 0: none. ``wandering``: log likelihood
+    ratio of each of ``WANDERING`` against none, by BIC; empty where it was not asked.
     """
 
     usable: np.ndarray
     coefficients: np.ndarray
     variance: np.ndarray
     wander: float = 0.0
+    wandering: tuple[float, ...] = ()
 
 
 def products(bands: list[np.ndarray], usable: np.ndarray, columns: Sequence, weights: Weights) -> np.ndarray:
@@ -208,16 +210,19 @@ def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True) -> Weig
     its level wanders and how its variance comes and goes as well."""
     n = int(keep.sum())
     best, chosen = np.inf, Weights(keep, np.zeros(0), np.ones(len(white)))
+    scores = []
     for wander in WANDERING if changing else (0.0,):
         trial = Weights(keep, np.zeros(0), np.ones(len(white)), wander)
         left = filtered(white[:, None], trial)[:, 0]
         coefficients, variance, score = autoregression(left, keep)
+        scores.append(score)
         score += (wander > 0.0) * np.log(n)
         if score < best:
             best = score
             chosen = replace(trial, coefficients=coefficients, variance=np.full(len(white), max(variance, 1e-6)))
-    if not changing:
+    if not changing or not np.isfinite(scores).all():
         return chosen
+    chosen = replace(chosen, wandering=tuple(0.5 * (scores[0] - np.array(scores))))
     new = filtered(white[:, None], chosen)[:, 0]
     local = local_variance(new, keep, LOCAL)
     variance = chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local

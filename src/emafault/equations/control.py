@@ -154,7 +154,8 @@ def late(state: State) -> np.ndarray:
 
 
 def usable(state: State) -> np.ndarray:
-    """(block,) where the rotor turns, no limit may be reached at random and no average looks beyond the record."""
+    """(block,) where the rotor turns, no limit may be reached at random, nothing is cut off and no average looks
+    beyond the record."""
     rec = state.rec
     return rec.once(("control.usable",), lambda: _usable(rec, np.sign(state.drive)))
 
@@ -163,7 +164,8 @@ def _usable(rec, sign: np.ndarray) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    limited = binary_dilation(_at_limit(rec) | _without_headroom(rec), iterations=odd(SPEED_SPAN / rec.interval))
+    limited = _at_limit(rec) | _without_headroom(rec) | rec.lost
+    limited = binary_dilation(limited, iterations=odd(SPEED_SPAN / rec.interval))
     free = ~limited[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean
     level = rec.level[: count * width].reshape(count, width)

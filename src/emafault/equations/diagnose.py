@@ -10,6 +10,7 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
+from ..diagnosis import wandering
 from ..diagnosis.closure import Ladder
 from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite
@@ -109,7 +110,11 @@ def diagnose(
         fit = bench.fit((begun, begun.fit()))
     else:
         fit = bench.fit()
-    reading = read(fit.models, fit.search.units.values(), tuple(machine.observed()))
+    counted = bool(told({n: recordings[n] for n in explore}))
+    reading = read(
+        fit.models, fit.search.units.values(), tuple(machine.observed()), counted=counted,
+        wandering=wandering.log_odds(bench),
+    )  # fmt: skip
     sealed = _seal(reading)
     if not confirm:
         return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own)
@@ -124,7 +129,7 @@ def diagnose(
     named = read(all_fit.models, units, observed).named
     models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
-    final = read(models, units, observed)
+    final = read(models, units, observed, counted=bool(told(recordings)), wandering=wandering.log_odds(every))
     return _diagnosed(
         name, split, whole, every, all_fit, final, sealed, HeldOut(ladder, bench, fit, ratios, changes), recordings, own
     )

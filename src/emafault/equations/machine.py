@@ -279,7 +279,8 @@ class ReferenceActuator:
         state = State(rec, Point(values, rec.name, wanted))
         blocks = []
         for j, (name, r) in enumerate(electrical.residuals(state).items()):
-            blocks.append(self._block(state, name, r, electrical.noise_bands(state, j), electrical.usable(state, j)))
+            usable = electrical.usable(state, j) & _known(state, name)
+            blocks.append(self._block(state, name, r, electrical.noise_bands(state, j), usable))
         for name, equation in OF_STATE.items():
             if equation is bus and rec.bus is None:
                 continue
@@ -290,6 +291,7 @@ class ReferenceActuator:
                 usable = np.ones(np.size(r.value), bool)
             else:
                 usable = equation.usable(state) if hasattr(equation, "usable") else _not_first(rec)
+            usable = usable & _known(state, name)
             blocks.append(self._block(state, name, r, equation.noise_bands(state), usable))
         return blocks
 
@@ -387,16 +389,10 @@ class ReferenceActuator:
             drivers += [state.bus_current]
         elif equation == "position":
             drivers += [base["direction"], rec.acceleration / 1e3]
-        of: Callable[[np.ndarray], np.ndarray] | None = None
+        of = rows_of(state, equation)
         if equation == "control":
-            width = control.block_length(rec)
-            blocks = (np.arange(rec.size // width - 1) + 1) * width
             phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
-            of = rows_at(blocks)
-        elif equation == "commutation":
-            of = rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
-        elif equation.startswith("electrical") and rec.current_end is None:
-            of = electrical.averaging(state, "abc".index(equation[-1]))
+        elif equation.startswith("electrical") and of is not None:
             # what means over runs leave of ripple and commutations beats with both
             kinds |= {"highest_order": 0.5 * rec.actuator.pole_pairs, "highest_frequency": BEATS / electrical.RUN}
         if of is None:
@@ -415,6 +411,28 @@ class ReferenceActuator:
 def typical_torque(actuator: ActuatorParameters) -> float:
     """Torque of two phases at a tenth of the current limit (N m)."""
     return 0.2 * actuator.back_emf * actuator.current_limit
+
+
+def rows_of(state: State, equation: str) -> Callable[[np.ndarray], np.ndarray] | None:
+    """What an equation's rows have of a signal (sample,); None where they are the samples."""
+    rec = state.rec
+    if equation == "control":
+        width = control.block_length(rec)
+        return rows_at((np.arange(rec.size // width - 1) + 1) * width)
+    if equation == "commutation":
+        return rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
+    if equation.startswith("electrical") and rec.current_end is None:
+        return electrical.averaging(state, "abc".index(equation[-1]))
+    return None
+
+
+def _known(state: State, equation: str) -> np.ndarray | bool:
+    """(row,) where no current or voltage that an equation needs is cut off."""
+    lost = state.rec.lost
+    if equation in ("sensor_speed", "position") or not lost.any():
+        return True
+    of = rows_of(state, equation)
+    return ~lost if of is None else of(lost) == 0.0
 
 
 def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -1,11 +1,13 @@
-"""What recordings show of their measuring chain without a model: steps of a converter, held samples, spikes."""
+"""What recordings show of their measuring chain without a model: clipping, a converter's steps, held samples, spikes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from ..io.recording import Recording
+from ..io.sensors import cut_off
 from .signals import lattice_step
 
 CHANNELS = {
@@ -21,14 +23,19 @@ FEWEST = 3  # spikes in a recording
 
 
 def told(recordings: Mapping[str, Recording]) -> list[dict[str, Any]]:
-    """Steps, held samples and spikes as entries of ``discovered``."""
+    """Clipping, steps, held samples and spikes as entries of ``discovered``."""
     out = []
+    cut = {name: cut_off(recording) for name, recording in recordings.items()}
     for channel, (equation, words, units) in CHANNELS.items():
-        steps, held, spikes = {}, {}, {}
+        steps, held, spikes, clipped = {}, {}, {}, {}
         for name, recording in recordings.items():
             values = getattr(recording, channel)
             if values is None:
                 continue
+            lost = cut[name].get(channel, np.zeros(1, bool))
+            if lost.any():
+                clipped[name] = float(np.abs(values[lost]).max())
+                values = values[~binary_dilation(lost.any(axis=1))]
             columns = values.reshape(len(values), -1).T
             step = max(lattice_step(x) for x in columns)
             if step > 0.0:
@@ -43,6 +50,7 @@ def told(recordings: Mapping[str, Recording]) -> list[dict[str, Any]]:
                 if rate:
                     spikes[name] = rate
         for form, found, parameter, unit, text in (
+            ("clipping", clipped, "level", units, "the {0} channel is cut off at {1:.3g} {2}"),
             ("adc_step", steps, "step", units, "the {0} channel comes in steps of {1:.3g} {2}"),
             ("held", held, "share", "1", "the {0} channel repeats {3:.2g} % of its samples"),
             ("spikes", spikes, "share", "1", "the {0} channel has spikes in {3:.2g} % of its samples"),

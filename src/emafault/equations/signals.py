@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.recording import Recording
+from ..io.sensors import cut_off
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
@@ -37,14 +38,18 @@ class Signals:
     ambient: float
     health: str
     noise: SensorNoise
+    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off, here or next to it
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
         r = recording
+        lost = np.zeros(len(r.time), bool)
+        for cut in cut_off(r).values():
+            lost |= binary_dilation(cut.any(axis=1))
         return cls(
             name, actuator, r.interval, r.phase_voltage, r.phase_current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
-            noise,
+            noise, lost,
         )  # fmt: skip
 
     def __post_init__(self) -> None:

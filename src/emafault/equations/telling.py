@@ -80,9 +80,16 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
         along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
     return {
         "equation": where, "along": along,
-        "form": "coefficient" if form.word == "function" and form.driver else form.word, "parameters": parameters,
+        "form": _word(form), "parameters": parameters,
         "sentence": _sentence(form, where, what, {n: (p["value"], p["units"]) for n, p in parameters.items()}, along),
     }  # fmt: skip
+
+
+def _word(form: Described) -> str:
+    """A form's word in the verdict."""
+    if form.word == "function" and form.driver:
+        return "coefficient"
+    return "function" if form.word == "power" else form.word
 
 
 def picture(form: Described, found: Mapping[str, list[float]], actuator: ActuatorParameters) -> dict[str, Any]:
@@ -119,6 +126,10 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         says = f"{what} is {height} {more} about {of('centre')} of the turn, over {of('width')}"
     elif form.word == "step_change":
         says = f"{what} jumps by {of('jump')} at {of('time')}"
+    elif form.word == "power":
+        says = (
+            f"{what} goes with the speed to the power of {found['exponent'][0]:.3g}, {of('at_100_rad_s')} at 100 rad/s"
+        )
     elif form.word == "memory":
         source = WORDS[memory.SOURCES[int(form.values["source"])]]
         says = f"{what} builds up with the {source}, with a time constant of {of('time_constant')}"

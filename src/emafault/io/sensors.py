@@ -18,6 +18,7 @@ MOVING = 2.0  # rad/s
 CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme value
 CLIPPED_LEAST = 20
 CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
+CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
@@ -182,29 +183,51 @@ def useless(recording: Recording, actuator: ActuatorParameters):
 
 
 def clipped(recording: Recording):
-    """Yield (variable, rule) for channels that sit at one extreme value in a hundredth of the motion or more."""
-    dt, theta = recording.interval, recording.rotor_angle
-    half = max(1, round(1e-3 / dt))
-    w = np.zeros(len(theta))
-    w[half:-half] = (theta[2 * half :] - theta[: -2 * half]) / (2 * half * dt)
-    moving = np.abs(w) > MOVING
+    """Yield (variable, rule) for channels whose samples at one extreme value leave too little of the motion."""
+    moving, w = _motion(recording)
     if moving.sum() < 3 * CLIPPED_LEAST:
         return
-    least = max(CLIPPED_LEAST, CLIPPED_SHARE * moving.sum())
-    channels = {"phase_voltage": recording.phase_voltage, "phase_current": recording.phase_current}
-    if recording.phase_current_end is not None:
-        channels["phase_current_end"] = recording.phase_current_end
-    for variable, values in channels.items():
-        for j, letter in enumerate(PHASES):
-            for extreme in (np.max, np.min):
-                level, count, beside = _at_extreme(values[moving, j], extreme)
-                if abs(level) > 1e-9 and count > 5 * beside and count >= (least if beside > 1.5 else CLIPPED_FINE):
-                    yield variable, f"clips: phase {letter} is at {level:.4g} in {count} samples"
+    for variable, cut in cut_off(recording).items():
+        lost = (cut & moving[:, None]).any(axis=1).sum()
+        if lost > CLIPPED_MOST * moving.sum():
+            j = int(np.argmax(cut.sum(axis=0)))
+            level = getattr(recording, variable)[cut[:, j], j][0]
+            yield variable, f"clips: phase {PHASES[j]} is at {level:.4g} in {cut[:, j].sum()} samples"
     for extreme in (np.max, np.min):
         level, count, _ = _at_extreme(recording.rotor_speed[moving], extreme)
         beyond = np.abs(w[moving][recording.rotor_speed[moving] == level]) - abs(level)
         if count >= CLIPPED_FINE and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
             yield "rotor_speed", f"clips: {level:.4g} rad/s in {count} samples while the rotor turns faster"
+
+
+def cut_off(recording: Recording) -> dict[str, np.ndarray]:
+    """Samples that a channel's range cuts off, (sample, phase) by variable: those at one extreme value, where a
+    hundredth of the motion or more is; none of channels that have none."""
+    moving, _ = _motion(recording)
+    if moving.sum() < 3 * CLIPPED_LEAST:
+        return {}
+    least = max(CLIPPED_LEAST, CLIPPED_SHARE * moving.sum())
+    out = {}
+    for variable in ("phase_voltage", "phase_current", "phase_current_end"):
+        values = getattr(recording, variable)
+        cut = np.zeros((len(moving), 3), bool)
+        for j in range(3) if values is not None else ():
+            for extreme in (np.max, np.min):
+                level, count, beside = _at_extreme(values[moving, j], extreme)
+                if abs(level) > 1e-9 and count > 5 * beside and count >= (least if beside > 1.5 else CLIPPED_FINE):
+                    cut[:, j] |= values[:, j] == level
+        if cut.any():
+            out[variable] = cut
+    return out
+
+
+def _motion(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """(sample,) where the rotor moves, and the angle's rate (rad/s)."""
+    dt, theta = recording.interval, recording.rotor_angle
+    half = max(1, round(1e-3 / dt))
+    w = np.zeros(len(theta))
+    w[half:-half] = (theta[2 * half :] - theta[: -2 * half]) / (2 * half * dt)
+    return np.abs(w) > MOVING, w
 
 
 def _at_extreme(values: np.ndarray, extreme: Callable) -> tuple[float, int, float]:

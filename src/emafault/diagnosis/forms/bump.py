@@ -33,7 +33,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     cells = left.cells(lambda b: (np.asarray(b.coordinates["rotor_angle"]) / EDGE).astype(int), CELLS, driver)
     middle = EDGE * (np.arange(CELLS) + 0.5)
     tried = [{"centre": float(c), "width": w} for w in WIDTHS for c in middle]
-    values = singly(*of_cells(np.array([_about(middle, t["centre"], t["width"]) for t in tried]), *cells))
+    values = singly(*of_cells(np.array([_about(middle, t["centre"], t["width"]) for t in tried]), cells))
     return tried[int(np.argmax(values))], float(values.max())
 
 

@@ -54,7 +54,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
 
         cells = left.cells(cell, CELLS, driver)
         splines = _splines(low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
-        value = gain(*of_cells(splines, *cells))
+        value = gain(*of_cells(splines, cells))
         if best is None or value > best[1]:
             best = shape, value
     return best

@@ -33,11 +33,11 @@ def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
     return lfilter([share], [1.0, share - 1.0], x)
 
 
-def _values(left: Left, driver: int, tried: list[tuple[int, float]]) -> np.ndarray:
+def _values(left: Left, driver: int, tried: list[tuple[int, float]], slow: bool = False) -> np.ndarray:
     def of(b: Block) -> np.ndarray:
         return np.array([np.ones(len(b.residual)), *(_filtered(b.coordinates, *s) for s in tried)])
 
-    return singly(*beside_first(*left.products(of, driver)))
+    return singly(*beside_first(*(left.slowly if slow else left.products)(of, driver)))
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
@@ -45,26 +45,9 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     if any(n not in left.blocks[0].coordinates for n in ("current", "rotor_speed")):
         return None
     tried = [(k, float(left.longest * c)) for k in range(len(SOURCES)) for c in CONSTANTS]
-    values = singly(*_roughly(left, driver, tried))
+    values = _values(left, driver, tried, slow=True)
     source, constant = tried[int(np.argmax(values))]
     return {"source": float(source), "time_constant": constant}, float(values.max())
-
-
-def _roughly(left: Left, driver: int, tried: list[tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """Score and information, as of slow columns, of each by itself, a constant of the driver apart."""
-    g, power = np.zeros(len(tried)), np.zeros(len(tried))
-    once, twice = 0.0, np.zeros((2, len(tried)))  # of the constant, and of it with each
-    for b, weighed, known in zip(left.blocks, left.weighed, left.known, strict=True):
-        d = np.asarray(b.coordinates["drivers"][driver])
-        u, p = weighed * d, known * d * d
-        once += float(p.sum())
-        for k, s in enumerate(tried):
-            x = _filtered(b.coordinates, *s)
-            g[k] += x @ u
-            power[k] += np.square(x) @ p
-            twice[:, k] += u.sum(), x @ p
-    g -= twice[0] * twice[1] / max(once, 1e-300)
-    return g, np.diag(np.maximum(power - twice[1] ** 2 / max(once, 1e-300), 0.0))
 
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:

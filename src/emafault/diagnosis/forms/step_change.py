@@ -30,7 +30,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     """The best of times that divide the longest recording."""
     width = left.longest / CELLS
     cells = left.cells(lambda b: (np.asarray(b.coordinates["time"]) / width).astype(int), CELLS, driver)
-    values = singly(*of_cells(np.array([np.arange(CELLS) >= k for k in range(1, CELLS)], float), *cells))
+    values = singly(*of_cells(np.array([np.arange(CELLS) >= k for k in range(1, CELLS)], float), cells))
     return {"time": float(width * (1 + np.argmax(values)))}, float(values.max())
 
 
