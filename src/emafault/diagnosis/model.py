@@ -9,7 +9,8 @@ LISTED = ("structural", "calibration")  # kinds of units that the catalogue list
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
-    "lag", "crosstalk", "drift", "order", "frequency", "bump", "step_change", "function", "power", "memory",
+    "lag", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "function", "power",
+    "memory",
 )  # fmt: skip
 
 

@@ -1,9 +1,10 @@
-"""Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk."""
+"""Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk, curves."""
 
 from collections.abc import Callable
 
 import numpy as np
 
+from ..actuator.parameters import ActuatorParameters
 from .dual import Dual
 from .point import Point, effect_name
 from .signals import Signals
@@ -60,8 +61,30 @@ def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:
     return out
 
 
+def full_range(actuator: ActuatorParameters, channel: str) -> float:
+    """Voltage (V) or current (A) at which the bend of a channel's curve is told."""
+    return 0.5 * actuator.bus_voltage if channel == "voltage" else actuator.current_limit
+
+
+def bent(p: Point, channel: str, phase: str, x: Dual | np.ndarray, actuator: ActuatorParameters) -> Dual:
+    """What a signal loses on a channel whose curve is bent: a share of it at full range, which goes with the cube.
+
+    All phases have it alike, or one its own.
+    """
+    plain = np.asarray(x.value if isinstance(x, Dual) else x)
+    cubic, full = None, full_range(actuator, channel)
+    out = Dual(0.0)
+    for name in (f"curve.{channel}", f"curve.{channel}_{phase}"):
+        bend = p(name)
+        if bend.slopes or bend.value:
+            cubic = plain * np.square(plain / full) if cubic is None else cubic
+            out = out + bend * cubic
+    return out
+
+
 def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
-    """Mean and end currents (A) of each phase from the recorded ones: lag, crosstalk, drift, then offset and gain."""
+    """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
+    and gain."""
     share = rec.time / rec.time[-1]
     means: list[Dual] = []
     ends: list[Dual] = []
@@ -73,6 +96,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
         for j in range(3):
             i = undone(p, "current", source[:, j], rec.size)
             drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
+            i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
             i = i - drift * share - p(f"rounded.{'abc'[j]}@{rec.name}")
             for q in range(3):
                 if q != j:

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis.forms import FORMS
 from ..errors import InputError
 from ..io.recording import Recording, write_recording
-from .acquisition import advanced, delayed
+from .acquisition import advanced, delayed, full_range
 from .diagnose import Diagnosed
 from .quality import spiked
 
@@ -22,8 +22,8 @@ OF_THE_CHANNEL = ("frequency", "step_change")
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
     """The recordings less the faults of their measuring chain, and what has been undone.
 
-    Lag, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are replaced
-    by the mean of their neighbours. What cannot be undone (held samples, steps of a converter, clipping) stays.
+    Lag, curve, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are
+    replaced by the mean of their neighbours. What cannot be undone (held samples, converter steps, clipping) stays.
     """
     out, undone = {}, dict[str, None]()
     for name, recording in recordings.items():
@@ -52,6 +52,11 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
         if f"~lag_{quantity}" in told:
             late, early = (values.get(f"lag.{quantity}_{side}", 0.0) for side in ("late", "early"))
             yield f"lag of the {quantity} channel", partial(_shifted, quantity=quantity, late=late, early=early)
+    for quantity in ("voltage", "current"):
+        if f"~curve_{quantity}" in told:
+            bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
+            full = full_range(found.bench.machine.actuator, quantity)
+            yield f"curve of the {quantity} channels", partial(_straightened, quantity=quantity, bends=bends / full**2)
     if "~crosstalk_current" in told:
         gains = np.array([[values.get(f"crosstalk.{j}{q}", 0.0) if j != q else 0.0 for q in "abc"] for j in "abc"])
         yield "crosstalk between the currents", partial(_without_crosstalk, gains=gains)
@@ -94,6 +99,13 @@ def write_corrected(
     for name, recording in out.items():
         write_recording(folder / name, recording)
     return undone
+
+
+def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Recording:
+    """``bends`` (phase,) what is lost over the cube of the signal."""
+    names = ("phase_voltage",) if quantity == "voltage" else ("phase_current", "phase_current_end")
+    old = {n: x for n in names if (x := getattr(recording, n)) is not None}
+    return replace(recording, **{n: x + bends * x**3 for n, x in old.items()})
 
 
 def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:

@@ -36,7 +36,6 @@ from .terms import TERMS
 
 SCHEMA = "2.0"
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
-FORM = {"~lag": "lag", "~crosstalk": "crosstalk", "~drift": "drift"}
 SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
 TOLD = 3.0  # standard deviations from nominal at which a controller's gain is told as different
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
@@ -328,17 +327,8 @@ def _discovered(
             entry = telling.told(described[form], linear, machine.actuator)
             entry["curve"] = telling.picture(described[form], found, machine.actuator)
         else:
-            kind = next(v for k, v in FORM.items() if form.startswith(k))
-            channel = form.split("_", 1)[1].replace("_", " of phase ")
             units = {p.name: p.units for p in unit.parameters}
-            entry = {
-                "equation": unit.equations[0], "along": "time", "form": kind,
-                "parameters": {
-                    n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]}
-                    for n, (v, sd) in linear.items()
-                },
-                "sentence": f"In the measuring chain: {kind} of the {channel} channel.",
-            }  # fmt: skip
+            entry = telling.told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,

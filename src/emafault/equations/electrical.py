@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from .acquisition import recorded_late
+from .acquisition import bent, recorded_late
 from .commutation import EDGE, REACH, rows_of
 from .dual import Dual, value_of
 from .point import State, effect_name
@@ -65,12 +65,12 @@ def residuals(state: State) -> dict[str, Dual]:
 
 
 def _recorded(state: State, true: list[Dual]) -> list[Dual]:
-    """What is recorded of the true voltages: lag, gains, then the star point."""
+    """What is recorded of the true voltages: lag, gains, the star point, then the channels' curves."""
     p = state.p
     true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
-    return true
+    return [v - bent(p, "voltage", "abc"[j], v, state.rec.actuator) for j, v in enumerate(true)]
 
 
 def usable(state: State, j: int) -> np.ndarray:

@@ -22,6 +22,7 @@ EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes 
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
+BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
 SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -190,6 +191,10 @@ class ReferenceActuator:
         # one pair: what both others add to a phase together is a gain, for the three add up to nothing
         variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
         out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
+        for channel in ("voltage", "current"):
+            of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
+            variants = [Variant([Parameter(f"curve.{c}", 0.0, 0.0, BEND, "1")]) for c in of]
+            out.append(Unit(f"~curve_{channel}", "form", (f"sensor_{channel}",), variants, among=2.0))
         for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
             for j in PER_PHASE:
                 parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings]

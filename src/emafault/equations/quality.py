@@ -1,4 +1,4 @@
-"""What recordings show of their measuring chain without a model: clipping, a converter's steps, held samples, spikes."""
+"""What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -81,12 +81,17 @@ def _before(x: np.ndarray) -> np.ndarray:
 def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:
     """Mean of f over the part of each interval in which its phase is switched on.
 
-    The mean of f i is the mean current times this, even where the current sets in within the interval.
+    The mean of f i is the mean current times this, even where the current sets in within the interval. Switched off, it
+    flows on until the bus voltage has taken it down.
     """
+    rec, motor = state.rec, state.rec.actuator
+    passing = 2.0 * motor.inductance * rec.level / motor.bus_voltage  # s, about
+    flows_on = np.clip(motor.pole_pairs * rec.speed * passing, -PLATEAU, PLATEAU)
     centre = 0.5 * (low + high)
     half_turn = np.pi * np.floor(centre / np.pi)
-    a = np.clip(low, half_turn + PLATEAU, half_turn + np.pi - PLATEAU)
-    b = np.clip(high, half_turn + PLATEAU, half_turn + np.pi - PLATEAU)
+    first = half_turn + PLATEAU + np.minimum(flows_on, 0.0)
+    last = half_turn + np.pi - PLATEAU + np.maximum(flows_on, 0.0)
+    a, b = np.clip(low, first, last), np.clip(high, first, last)
     narrow = b - a < 1e-5
     b = np.where(narrow, a + 1e-5, b)
     return _mean_shape(state, a, b, shift, ramp) * (1.0 / (b - a))

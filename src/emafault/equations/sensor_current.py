@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from .acquisition import recorded_late
+from .acquisition import bent, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
 
 
 def residual(state: State) -> Dual:
-    """Recorded sum (A) less what gains, offsets, drift, crosstalk and lag make of currents that add up to nothing.
+    """Recorded sum (A) less what gains, offsets, drift, crosstalk, curves and lag make of currents that add up to
+    nothing.
 
     The true currents are taken as the recorded ones less their mean: the noise of these is independent of that of the
     sum, so that no term can explain the noise. The recorded sum keeps coefficient one.
@@ -26,6 +27,7 @@ def residual(state: State) -> Dual:
         for q, other in enumerate("abc"):
             if q != j:
                 seen = seen + p(f"crosstalk.{phase}{other}") * true[q]
+        seen = seen - bent(p, "current", phase, true[j], rec.actuator)
         out = out - seen
     return out
 

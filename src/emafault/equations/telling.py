@@ -9,6 +9,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
+from .acquisition import full_range
 from .machine import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
@@ -82,6 +83,34 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
         "equation": where, "along": along,
         "form": _word(form), "parameters": parameters,
         "sentence": _sentence(form, where, what, {n: (p["value"], p["units"]) for n, p in parameters.items()}, along),
+    }  # fmt: skip
+
+
+def told_of_chain(
+    unit: str,
+    equation: str,
+    linear: Mapping[str, tuple[float, float]],
+    units: Mapping[str, str],
+    actuator: ActuatorParameters,
+) -> dict[str, Any]:
+    """The same of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve."""
+    kind, _, channel = unit.removeprefix("~").partition("_")
+    name = channel.replace("_", " of phase ")
+    said = {n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]} for n, (v, sd) in linear.items()}
+    if kind == "curve":
+        full = f"{full_range(actuator, channel):g} {'V' if channel == 'voltage' else 'A'}"
+        ((at, bend),) = said.items()
+        phase = at.partition("_")[2]
+        which = f"{channel} of phase {phase}" if phase else f"{channel}s"
+        (share, _) = linear[at]
+        falls = f"the recorded {which} fall short by {100.0 * share:.2g} % at {full}"
+        return {
+            "equation": equation, "along": "current" if channel == "current" else "time", "form": "sensor_curve",
+            "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {falls}, and with the cube below.",
+        }  # fmt: skip
+    return {
+        "equation": equation, "along": "time", "form": kind, "parameters": said,
+        "sentence": f"In the measuring chain: {kind} of the {name} channel.",
     }  # fmt: skip
 
 
