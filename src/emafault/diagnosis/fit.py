@@ -354,7 +354,8 @@ class Bench(NormalEquations):
         return search.fit(tuple(width), fixed), at_point
 
     def _leave_out(self, search: Search, normal: Normal) -> bool:
-        """Compare the leading set with those that lack one member, each at its own optimum; whether one is better.
+        """Compare the leading set with those that lack one member, or have a listed effect in the place of a described
+        form, each at its own optimum; whether one is better.
 
         What the linear model says of them from a point far from theirs is replaced by what it says at their own.
         """
@@ -377,8 +378,36 @@ class Bench(NormalEquations):
             less.log_posterior += error
             if own.log_posterior > top:
                 top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
+        for listed in self._listed_instead(search, best):
+            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.move(listed, normal)
+            own = self.settle(Model(listed.choices, 0.0, 0.0, {}, {}))
+            if own.log_posterior > top:
+                top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
         self.point, self.on = better[0] if better[1] else begun
         return better[1]
+
+    def _listed_instead(self, search: Search, best: Model) -> list[Model]:
+        """A set with each of the likeliest listed effects in the place of each of its described forms.
+
+        A far optimum may look from here less like the effect that it is than like a form.
+        """
+        out = []
+        for form in (f.id for f in self.described if f.id in best.units):
+            rest = tuple((c.unit, c.variant) for c in best.choices if c.unit != form)
+            sets = [
+                (*rest, m)
+                for m in search.candidates
+                if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM and m[0] not in best.units
+            ]
+            likeliest: dict[str, Model] = {}  # variant of each effect
+            for members in sets:
+                if np.isfinite(search.log_prior(members)):
+                    found, effect = search.fit(members), members[-1][0]
+                    if effect not in likeliest or found.log_posterior > likeliest[effect].log_posterior:
+                        likeliest[effect] = found
+            out += sorted(likeliest.values(), key=lambda m: -m.log_posterior)[:SINGLES]
+        return out
 
     def _by_secant(self, unit: str) -> bool:
         return any(p.secant is not None for u in self.units if u.id == unit for p in u.parameters)

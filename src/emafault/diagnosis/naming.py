@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
-import numpy as np
 from scipy.special import expit
 
 from .model import LISTED, Unit
@@ -48,7 +47,7 @@ def read(
 
     ``one_equation``: whether only effects that act in a common equation may be a group; ``counted``: whether the
     recordings show faults of their measuring chain without a model; ``wandering``: by equation, log odds that what is
-    left in it wanders, which is a remainder of it that no column shows.
+    left in it wanders, which is a remainder of it that no column shows where no listed effect acts.
     """
     units = list(units)
     kind = {u.id: u.kind for u in units}
@@ -57,12 +56,19 @@ def read(
     masses: dict[tuple[str, ...], float] = {}
     leading: dict[tuple[str, ...], Model] = {}
     empty = unknown = 0.0
-    wanders = {f"remainder:{e}": float(expit(odds)) for e, odds in wandering.items()}
-    steady = float(np.prod([1.0 - p for r, p in wanders.items() if r not in OWN_BUSINESS]))
+    acts = {u.id: u.equations for u in units}
+    wanders = {e: float(expit(odds)) for e, odds in wandering.items()}
     for model, w in zip(models, weights, strict=True):
         listed = tuple(sorted({*observed, *(u for u in model.units if kind.get(u) in LISTED)}))
         for u in model.units:
             inclusion[u] = inclusion.get(u, 0.0) + float(w)
+        # what wanders beside a listed effect may be that one's own form
+        steady = 1.0
+        for e, p in wanders.items():
+            left = f"remainder:{e}"
+            if left not in model.units and not any(_meet(acts.get(u, ()), (e,)) for u in listed):
+                inclusion[left] = inclusion.get(left, 0.0) + float(w) * p
+                steady *= 1.0 - p
         if listed:
             masses[listed] = masses.get(listed, 0.0) + float(w)
             leading.setdefault(listed, model)
@@ -71,8 +77,6 @@ def read(
         else:
             empty += float(w) * steady
             unknown += float(w) * (1.0 - steady)
-    for left, p in wanders.items():
-        inclusion[left] = 1.0 - (1.0 - inclusion.get(left, 0.0)) * (1.0 - p)
     inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
