@@ -1,12 +1,15 @@
 """Described forms: each is found where it is, none where there is none, and found forms are columns like any other."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from emafault.diagnosis.described import Described, WithForms, proposed, refined, scanned
 from emafault.diagnosis.forms import FORMS
 from emafault.diagnosis.model import Block
-from emafault.diagnosis.whitening import Weights, coloured, filtered
+from emafault.diagnosis.wandering import log_odds
+from emafault.diagnosis.whitening import WANDERING, Weights, coloured, filtered
 
 H, SIZE, NAMES = 2e-4, 4000, ("one", "two", "three")
 
@@ -60,7 +63,7 @@ class Machine:
         return [Block(b.recording, b.equation, b.residual.copy(), {}, b.bands, b.usable, b.coordinates)]
 
     def proposed(self):
-        return proposed(self, scanned(self, self.found, self.carried, "x"))
+        return proposed(self, scanned(self, self.found, self.carried, {}, "x"))
 
 
 CASES = [
@@ -70,6 +73,7 @@ CASES = [
     ("bump", {"centre": 2.1, "width": 0.25}, (0.4,), 0),
     ("step_change", {"time": 0.31}, (0.5,), 1),
     ("function", {"coordinate": 0.0, "from": -150.0, "to": 150.0}, (0.3, -0.2, 0.1, 0.2, -0.2), 0),
+    ("power", {"exponent": 2.0}, (0.4,), 1),
     ("memory", {"source": 0.0, "time_constant": 0.12}, (0.05,), 1),
 ]
 
@@ -78,7 +82,7 @@ CASES = [
 def test_a_form_is_found_where_it_is(word, shape, sizes, driver):
     machine = Machine(word, shape, sizes, driver)
     first = machine.proposed()[0]
-    first = refined(WithForms(machine, [first]), first, machine.found, machine.carried, {})
+    first = refined(WithForms(machine, [first]), first, machine.found, machine.carried, {}, {})
     assert first.word == word
     assert first.driver == driver or word == "function"  # of the speed, its sign makes another one
     for name, value, deviation, _ in first.shape:
@@ -94,8 +98,8 @@ def test_a_scan_in_parts_finds_what_one_does(parts):
     other = [Block("one", "speed", b.residual, {}, b.bands, b.usable, b.coordinates) for b in machine.found]
     blocks = [*machine.found, *other]
     carried = {n: {**w, "speed": w["torque"]} for n, w in machine.carried.items()}
-    whole = scanned(machine, blocks, carried, "x")
-    in_parts = [f for k in range(parts) for f in scanned(machine, blocks, carried, "x", k, parts)]
+    whole = scanned(machine, blocks, carried, {}, "x")
+    in_parts = [f for k in range(parts) for f in scanned(machine, blocks, carried, {}, "x", k, parts)]
     assert {f.equation for _, f in whole} == {"torque", "speed"}
     assert sorted(f.id for _, f in in_parts) == sorted(f.id for _, f in whole)
     assert proposed(machine, in_parts) == proposed(machine, whole)
@@ -108,7 +112,32 @@ def test_a_recording_of_a_row_is_passed_over():
     along = {n: np.asarray(x)[..., :1] if n != "slow" else x for n, x in b.coordinates.items()}
     one = Block("short", "torque", b.residual[:1], {}, [b.bands[0][:1]], b.usable[:1], along)
     carried = {**machine.carried, "short": {"torque": Weights(b.usable[:1], np.zeros(0), np.ones(1))}}
-    assert proposed(machine, scanned(machine, [*machine.found, one], carried, "x")) == whole
+    assert proposed(machine, scanned(machine, [*machine.found, one], carried, {}, "x")) == whole
+
+
+def test_what_is_free_beside_a_form_is_taken_out():
+    machine = Machine("power", {"exponent": 2.0}, (1.0,), 1)
+    free = {"level": (0.0, 10.0), "slope": (0.0, 10.0)}
+    for b in machine.found:  # what every machine has beside it, away from where it would be fitted with it
+        drag = b.coordinates["drivers"][1]
+        b.columns |= {"level": -drag, "slope": -np.abs(b.coordinates["rotor_speed"]) / 100.0 * drag}
+        b.residual = b.residual + 0.8 * b.columns["slope"]
+    seen = {d.word: (v, d.values) for v, d in scanned(machine, machine.found, machine.carried, free, "x")}
+    assert max(seen, key=lambda w: seen[w][0]) == "power" and seen["power"][1]["exponent"] == pytest.approx(
+        2.0, rel=0.2
+    )
+    blind = {d.word: (v, d.values) for v, d in scanned(machine, machine.found, machine.carried, {}, "x")}
+    assert abs(blind["power"][1]["exponent"] - 2.0) > 0.4
+
+
+def test_a_form_that_is_free_anyway_is_none():
+    machine = Machine()
+    for b in machine.found:
+        power = FORMS["power"].columns(b.coordinates, {"exponent": 2.0})[0] * b.coordinates["drivers"][1]
+        b.columns |= {"drag": -power, "level": -b.coordinates["drivers"][1]}
+        b.residual = b.residual + 0.4 * power
+    assert scanned(machine, machine.found, machine.carried, {}, "x")
+    assert not scanned(machine, machine.found, machine.carried, {"drag": (0.0, 10.0), "level": (0.0, 10.0)}, "x")
 
 
 def test_noise_alone_has_no_form():
@@ -152,6 +181,25 @@ def test_a_level_that_wanders_does_not_look_like_a_constant():
     white = rng.standard_normal(8000) + np.cumsum(0.1 * rng.standard_normal(8000))
     weights = coloured(white, keep)
     assert weights.wander > 0.0
+    assert np.argmax(weights.wandering) == WANDERING.index(weights.wander) and max(weights.wandering) > 100.0
     constant = filtered(np.ones((8000, 1)), weights)[:, 0]
     assert constant @ constant < 200.0  # white noise would have 8000
-    assert coloured(rng.standard_normal(8000), keep).wander == 0.0
+    steady = coloured(rng.standard_normal(8000), keep)
+    assert steady.wander == 0.0 and max(steady.wandering) < 5.0
+
+
+def test_wandering_is_asked_of_all_recordings_together():
+    def bench(*levels):
+        rng = np.random.default_rng(6)
+        keep = np.ones(4000, bool)
+        carried = {
+            f"r{n}": {
+                "torque": coloured(rng.standard_normal(4000) + np.cumsum(level * rng.standard_normal(4000)), keep)
+            }
+            for n, level in enumerate(levels)
+        }
+        return SimpleNamespace(carried=carried)
+
+    assert log_odds(bench(0.0, 0.0, 0.0))["torque"] < -1.0
+    assert log_odds(bench(0.05, 0.05, 0.05))["torque"] > 10.0
+    assert log_odds(SimpleNamespace(carried={"a": {"torque": coloured(np.ones(50), np.ones(50, bool), False)}})) == {}

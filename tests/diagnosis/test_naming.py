@@ -29,6 +29,25 @@ def test_only_what_acts_in_a_common_equation_is_a_group(equation, one_equation, 
     assert found.groups == ((("load", "other"),) if grouped else ())
 
 
+def test_what_the_recordings_show_of_their_chain_is_beside_whatever_is_named():
+    units = [unit("load", "torque")]
+    empty, named = [model(0.0), model(-9.0, "load")], [model(-9.0), model(0.0, "load")]
+    assert [read(m, units).verdict for m in (empty, named)] == ["no_gap", "explained"]
+    assert [read(m, units, counted=True).verdict for m in (empty, named)] == ["described", "partly"]
+
+
+def test_what_wanders_is_a_remainder_unless_a_listed_effect_acts_there():
+    units = [unit("load", "torque"), unit("gain", "sensor_current")]
+    wandering = {"torque": 5.0}
+    left = "remainder:torque"
+    nothing = read([model(0.0), model(-9.0, "load")], units, wandering=wandering)
+    assert nothing.verdict == "unknown" and nothing.remainders == (left,)
+    own = read([model(-9.0), model(0.0, "load")], units, wandering=wandering)
+    assert own.verdict == "explained" and own.inclusion[left] < 0.01
+    elsewhere = read([model(-9.0), model(0.0, "gain")], units, wandering=wandering)
+    assert elsewhere.verdict == "partly" and elsewhere.named == ("gain",)
+
+
 def log_evidence(tolerances, *hole):
     """Of a calibration effect over no effect, of a unit that many tolerances off, with a hole in its prior or none."""
     within, information = 0.1, 1e5  # of the wide prior

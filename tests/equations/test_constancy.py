@@ -1,10 +1,12 @@
 """Whether a named effect has one size in all recordings: a fault of the machine has, what changes has not."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from emafault.diagnosis.constancy import PRIOR, log_odds_of_change
 from emafault.diagnosis.fit import Bench
-from emafault.equations.diagnose import diagnose
+from emafault.equations.diagnose import diagnose, remainder_sentence
 
 from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
@@ -49,6 +51,11 @@ def test_what_changes_is_not_named_but_told():
     verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE).verdict
     assert "load_spring" not in verdict["which"][0]["effects"] and verdict["inclusion"]["load_spring"] < 0.9
     assert "torque" in {e["equation"] for e in verdict["discovered"]}
-    assert any(
-        "as if a spring acts on the user shaft, by another amount" in e["sentence"] for e in verdict["discovered"]
-    )
+
+
+def test_a_remainder_says_what_it_looks_like_in_each_recording():
+    search = SimpleNamespace(units={"load_spring": SimpleNamespace(equations=("torque",))})
+    said = remainder_sentence(search, "torque", {"load_spring": 4.0})
+    assert said.endswith("it looks as if a spring acts on the user shaft, by another amount each time.")
+    for other in (("torque", {"load_spring": -4.0}), ("bus", {"load_spring": 4.0})):
+        assert "looks as if" not in remainder_sentence(search, *other)

@@ -111,6 +111,33 @@ def test_a_disc_out_of_centre_is_told_in_the_angle_sensor():
     assert found["parameters"]["amplitude"]["value"] == pytest.approx(2e-3, rel=0.1)
 
 
+def test_a_bent_curve_of_the_voltages_is_told_and_undone(tmp_path):
+    true = {f"r{n}.nc": recorded("step", seed=n, theta_0=n) for n in range(4)}
+    faulty = {
+        n: replace(r, phase_voltage=r.phase_voltage * (1.0 - 0.02 * (r.phase_voltage / 24.0) ** 2))
+        for n, r in true.items()
+    }
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    (told,) = (d for d in found.verdict["discovered"] if d["form"] == "sensor_curve")
+    assert (found.verdict["verdict"], told["equation"]) == ("described", "sensor_voltage")
+    assert told["parameters"]["bend"]["value"] == pytest.approx(0.02, rel=0.1)
+    assert "curve of the voltage channels" in write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")
+    for name, r in true.items():
+        got = read_recording(tmp_path / "new" / name)
+        assert np.std(got.phase_voltage - r.phase_voltage) < 0.1 * np.std(faulty[name].phase_voltage - r.phase_voltage)
+
+
+def test_samples_that_clip_are_left_out_and_told(cogging):
+    clipped = {}
+    for name, r in bench(COGGING).items():
+        level = 0.7 * np.abs(r.phase_current[:, 1]).max()
+        clipped[name] = replace(r, phase_current=np.clip(r.phase_current, [-99.0, -level, -99.0], [99.0, level, 99.0]))
+    verdict = verdict_of(clipped)
+    assert (verdict["verdict"], verdict["which"][0]["effects"]) == ("partly", ["cogging"])
+    assert [d["form"] for d in verdict["discovered"]] == ["clipping"]
+
+
 def test_names_and_order_of_files_change_nothing(cogging):
     recordings = bench(COGGING)
     renamed = {f"x{9 - n}.nc": r for n, r in enumerate(recordings.values())}

@@ -110,6 +110,17 @@ def test_the_control_law_holds_where_a_step_is_braked(theta_0):
     assert abs(block.residual[block.usable].sum()) < 0.015
 
 
+def test_a_current_that_flows_on_makes_torque():
+    recording = recorded("step", interval=5e-5)
+    machine = machine_of({"a.nc": recording})
+    block = next(b for b in machine.blocks(truth(machine, recording), "a.nc") if b.equation == "torque")
+    # switched off at speed it flows on past the flat part of the back-EMF: of the torque, a share that grows with speed
+    share = block.coordinates["drivers"][3] * (np.abs(block.coordinates["rotor_speed"]) / 100.0) ** 1.5
+    x, left = whiten(block.bands, block.usable, np.array([share, block.residual]).T).T
+    assert np.abs(block.coordinates["rotor_speed"]).max() > 300.0
+    assert abs(x @ left) / np.sqrt(x @ x) < 3.0
+
+
 @pytest.mark.parametrize("effect", SIZES)
 def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     given, equation = SIZES[effect]

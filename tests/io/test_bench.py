@@ -8,7 +8,7 @@ import pytest
 from emafault.errors import InputError
 from emafault.io.bench import check_bench, read_bench
 from emafault.io.recording import write_recording
-from emafault.io.sensors import refuse_mistaken
+from emafault.io.sensors import cut_off, refuse_mistaken
 
 SWAPPED = [1, 0, 2]
 CYCLED = [1, 2, 0]
@@ -64,8 +64,8 @@ MISTAKEN = {
 }
 USELESS = {
     "still": (_still, "commanded_position"),
-    "current clips": (lambda r: _clip(r, "phase_current", 0.6), "phase_current"),
-    "voltage clips": (lambda r: _clip(r, "phase_voltage", 0.6), "phase_voltage"),
+    "current clips": (lambda r: _clip(r, "phase_current", 0.1), "phase_current"),
+    "voltage clips": (lambda r: _clip(r, "phase_voltage", 0.1), "phase_voltage"),
     "speed clips": (lambda r: _clip(r, "rotor_speed", 0.6), "rotor_speed"),
     "angle frozen": (_frozen, "rotor_angle"),
     "slow": (lambda r: _every(r, 10), "time"),
@@ -91,6 +91,19 @@ def test_useless_recordings_are_set_aside_with_a_warning_or_refused_where_nothin
     assert warning["file"] == NAME and warning["variable"] == variable
     with pytest.raises(InputError, match=NAME):
         check_bench("bench", {NAME: change(plain[NAME])}, shop.actuator)
+
+
+@pytest.mark.parametrize("variable", ["phase_current", "phase_voltage"])
+def test_a_recording_that_clips_here_and_there_is_kept_and_its_samples_are_known(plain, shop, variable):
+    cut = _clip(plain[NAME], variable, 0.7)
+    bench = check_bench("bench", plain | {NAME: cut}, shop.actuator)
+    assert NAME in bench.recordings
+    assert cut_off(plain[NAME]) == {}
+    ((name, where),) = cut_off(cut).items()
+    changed = getattr(cut, variable) != getattr(plain[NAME], variable)
+    told = where.any(axis=0)  # of a phase that loses a few samples nothing is told
+    assert name == variable and told.any() and np.array_equal(where[:, told], changed[:, told])
+    assert changed[:, ~told].sum(axis=0).max(initial=0) < 20
 
 
 def test_a_good_bench_passes_whole_with_strong_effects_too(plain, shop):

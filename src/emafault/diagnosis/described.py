@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import Definite
 from .forms import FORMS
-from .left import Left, gain
+from .left import Left, beside_first, gain
 from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
 from .search import FORM_PRIOR, OTHER_FORM, Search
@@ -230,9 +230,12 @@ def refined(
         def columns(b: Block) -> np.ndarray:
             return module.columns(b.coordinates, at.values)
 
+        def beside_constant(b: Block) -> np.ndarray:
+            return np.vstack([np.ones(len(b.residual)), columns(b)])
+
         if module.EACH:
             return sum(gain(*p) for p in left.each(columns, at.driver))
-        return gain(*left.products(columns, at.driver))
+        return gain(*beside_first(*left.products(beside_constant, at.driver)))
 
     best = value(form)
     for _ in range(REFINED):

@@ -50,7 +50,7 @@ def read(
     left in it wanders, which is a remainder of it that no column shows where no listed effect acts.
     """
     units = list(units)
-    kind = {u.id: u.kind for u in units}
+    kind = {**{f"remainder:{e}": "remainder" for e in wandering}, **{u.id: u.kind for u in units}}
     weights = posterior(models)
     inclusion: dict[str, float] = {e: 1.0 for e in observed}
     masses: dict[tuple[str, ...], float] = {}

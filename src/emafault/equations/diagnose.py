@@ -344,25 +344,23 @@ def _discovered(
                 "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
                 "parameters": {},
                 "recordings": list(bench.recordings),
-                "sentence": f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further."
-                + _changing(search, equation, changes),
+                "sentence": remainder_sentence(search, equation, changes),
             }
         )  # fmt: skip
     return out
 
 
-def _changing(search: Search, equation: str, changes: Mapping[str, float]) -> str:
-    """What an equation's remainder looks like in each recording, were it of one size in all."""
+def remainder_sentence(search: Search, equation: str, changes: Mapping[str, float]) -> str:
+    """What an equation leaves, and what it looks like in each recording, were it of one size in all."""
     like = [
         TERMS[e].SENTENCE
         for e, odds in changes.items()
         if odds > 0.0 and equation.startswith(tuple(search.units[e].equations))
     ]
-    return (
-        f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
-        if like
-        else ""
-    )
+    said = f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further."
+    if like:
+        said += f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
+    return said
 
 
 def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, float]) -> dict[str, dict]:
