@@ -386,7 +386,9 @@ class ReferenceActuator:
             drivers += [rec.direction, state.drive / typical, state.net / typical]
             kinds["sizes"] = {2: SHARE * typical, 3: 0.0}
         elif equation == "sensor_speed":
-            drivers += [w]
+            drivers += [
+                np.where(rec.moving, w, 0.0)
+            ]  # at rest the angle's rate is its noise, which the residual has too
         elif equation == "sensor_current":
             balanced = rec.current - rec.current.mean(axis=1, keepdims=True)
             drivers += [balanced[:, j] for j in range(2)]
