@@ -59,10 +59,10 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     widest = dict(zip(candidate.names, candidate.sd, strict=True))
     changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
     constant = [evidence(one), evidence(nearly)]
-    return float(_log_mean(changing) - _log_mean(constant) + PRIOR)
+    return float(log_mean(changing) - log_mean(constant) + PRIOR)
 
 
-def _log_mean(logs: list[float]) -> float:
+def log_mean(logs: Sequence[float]) -> float:
     """Logarithm of the mean."""
     return float(logsumexp(logs) - np.log(len(logs)))
 

@@ -163,7 +163,8 @@ class Bench(NormalEquations):
             return False
         names, workers = self._looked_through(), self._workers()
         carried = {n: self.carried[n] for n in names}
-        parts = [(self.values(), names, carried, self._free(), mark, k, workers.count) for k in range(workers.count)]
+        values, free = self.values(), self._free()
+        parts = [(values, names, carried, free, mark, k, workers.count) for k in range(workers.count)]
         found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
         found = [f for f in found if not any(f.same(g) for g in self.described)]
         self.describe([*self.described, *found])

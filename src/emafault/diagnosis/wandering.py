@@ -5,8 +5,8 @@ The filter that weighs the rows takes such a level up, so that no column shows i
 """
 
 import numpy as np
-from scipy.special import logsumexp
 
+from .constancy import log_mean
 from .fit import Bench
 from .model import SETTINGS
 from .search import REMAINDER_PRIOR
@@ -28,5 +28,5 @@ def log_odds(bench: Bench) -> dict[str, float]:
     out = {}
     for equation, each in ratios.items():
         shares = np.sum(each, axis=0)[1:]  # the first is none
-        out[equation] = float(logsumexp(shares) - np.log(len(shares)) + prior)
+        out[equation] = log_mean(shares.tolist()) + float(prior)
     return out

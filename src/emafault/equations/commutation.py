@@ -9,7 +9,7 @@ import numpy as np
 
 from .dual import Dual, Number
 from .point import State, effect_name
-from .signals import UNRESOLVED
+from .signals import UNRESOLVED, passing_time
 from .terms import with_hook
 
 EDGE = np.pi / 6.0
@@ -28,9 +28,7 @@ def rows_of(state: State, j: int) -> np.ndarray:
 def _rows_of(rec, j: int) -> np.ndarray:
     low, high, _ = sweep(rec, j)
     half = high - low < np.pi / 3.0
-    a = rec.actuator
-    passing = 2.0 * a.inductance * np.abs(rec.current[:, STAYS[j]]) / a.bus_voltage  # s, about
-    short = passing < LONGEST * rec.interval
+    short = passing_time(rec.actuator, np.abs(rec.current[:, STAYS[j]])) < LONGEST * rec.interval
     return np.flatnonzero((low < REACH) & (high > -REACH) & rec.moving & half & short)
 
 

@@ -6,6 +6,7 @@ from .acquisition import true_currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
 from .shape import trapezoid_at, trapezoid_swept
+from .signals import passing_time
 from .terms import with_hook
 
 PLATEAU = np.pi / 6.0  # electrical rad, where the commutation switches a phase on
@@ -85,8 +86,8 @@ def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:
     flows on until the bus voltage has taken it down.
     """
     rec, motor = state.rec, state.rec.actuator
-    passing = 2.0 * motor.inductance * rec.level / motor.bus_voltage  # s, about
-    flows_on = np.clip(motor.pole_pairs * rec.speed * passing, -PLATEAU, PLATEAU)
+    passed = motor.pole_pairs * rec.speed * passing_time(motor, rec.level)
+    flows_on = np.clip(passed, -PLATEAU, PLATEAU)
     centre = 0.5 * (low + high)
     half_turn = np.pi * np.floor(centre / np.pi)
     first = half_turn + PLATEAU + np.minimum(flows_on, 0.0)

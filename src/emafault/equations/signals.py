@@ -135,6 +135,11 @@ class Signals:
         return out
 
 
+def passing_time(actuator: ActuatorParameters, current: np.ndarray) -> np.ndarray:
+    """Time (s), about, in which a current (A) passes from phase to phase: the bus voltage over both inductances."""
+    return 2.0 * actuator.inductance * current / actuator.bus_voltage
+
+
 def odd(samples: float) -> int:
     """Length of a centred average: an even one would be half a sample late."""
     return 2 * int(0.5 * samples) + 1

@@ -103,10 +103,11 @@ def told_of_chain(
         phase = at.partition("_")[2]
         which = f"{channel} of phase {phase}" if phase else f"{channel}s"
         (share, _) = linear[at]
-        falls = f"the recorded {which} fall short by {100.0 * share:.2g} % at {full}"
+        verb = "has" if phase else "have"
+        bends = f"the recorded {which} {verb} a cubic nonlinearity, {100.0 * share:.2g} % too low at {full}"
         return {
             "equation": equation, "along": "current" if channel == "current" else "time", "form": "sensor_curve",
-            "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {falls}, and with the cube below.",
+            "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {bends}.",
         }  # fmt: skip
     return {
         "equation": equation, "along": "time", "form": kind, "parameters": said,
@@ -144,7 +145,7 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
 
     place = "In the measuring chain" if where.startswith("sensor") else f"In the {where.replace('_', ' ')} equation"
     if form.word == "order":
-        often = "once" if found["order"][0] == 1.0 else f"{found['order'][0]:.4g} times"
+        often = "once" if (times := f"{found['order'][0]:.4g}") == "1" else f"{times} times"
         says = f"{what} has a wave {often} per turn of the rotor, with an amplitude of {of('amplitude')}"
     elif form.word == "frequency":
         says = f"{what} oscillates at {of('frequency')} with an amplitude of {of('amplitude')}"
