@@ -198,8 +198,13 @@ def test_wandering_is_asked_of_all_recordings_together():
             }
             for n, level in enumerate(levels)
         }
-        return SimpleNamespace(carried=carried)
+        return SimpleNamespace(carried=carried, recordings=list(carried))
 
     assert log_odds(bench(0.0, 0.0, 0.0))["torque"] < -1.0
     assert log_odds(bench(0.05, 0.05, 0.05))["torque"] > 10.0
-    assert log_odds(SimpleNamespace(carried={"a": {"torque": coloured(np.ones(50), np.ones(50, bool), False)}})) == {}
+    short = {"a": {"torque": coloured(np.ones(50), np.ones(50, bool), False)}}
+    assert log_odds(SimpleNamespace(carried=short, recordings=["a"])) == {}
+    # what the explored recordings do not show, or those that confirm do not, is not there
+    assert log_odds(bench(0.05, 0.05, 0.05), ["r2"])["torque"] > 10.0
+    assert log_odds(bench(0.05, 0.05, 0.0), ["r2"])["torque"] < 0.0
+    assert log_odds(bench(0.0, 0.0, 0.05), ["r2"])["torque"] < 0.0

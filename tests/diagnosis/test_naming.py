@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.diagnosis.evidence import Reduced
+from emafault.diagnosis.linear import White
 from emafault.diagnosis.model import Parameter, Unit, Variant
 from emafault.diagnosis.naming import read
 from emafault.diagnosis.search import Candidate, Choice, Model, Search
@@ -119,6 +120,54 @@ def test_a_described_form_is_told_where_the_held_out_part_confirms_it(monkeypatc
     assert ("~order" in kept[0].units) == told
     if not told:
         assert all("~order" not in m.units for m in kept)
+
+
+@pytest.mark.parametrize(("after", "told"), [(99.0, False), (80.0, True)])
+def test_a_remainder_is_told_where_the_held_out_part_confirms_it(monkeypatch, after, told):
+    misfit = {("remainder:torque",): after, (): 100.0}
+    whole = [model(0.0, "remainder:torque"), model(-1.0, "load_spring"), model(-9.0)]
+    explored = [model(0.0, "remainder:torque"), model(-2.0)]
+    kept, ratios, _ = held(monkeypatch, misfit, whole, explored, [])
+    assert ratios == {"remainder:torque": 0.5 * (100.0 - after)}
+    assert (kept[0].units == ("remainder:torque",)) == told
+    if not told:  # its mass is that of nothing
+        assert all("remainder:torque" not in m.units for m in kept) and kept[0].units == ()
+
+
+def test_a_remainder_that_the_explored_recordings_never_had_is_not_told(monkeypatch):
+    whole = [model(0.0, "remainder:torque"), model(-9.0)]
+    kept, ratios, _ = held(monkeypatch, {(): 100.0}, whole, [model(0.0)], [])
+    assert ratios == {"remainder:torque": 0.0} and kept[0].units == ()
+
+
+def test_remainders_are_integrated_over_what_the_explored_recordings_leave_open():
+    """The predictive density of the confirm recordings is that of a Gaussian with the remainder's posterior in its
+    covariance."""
+    rng = np.random.default_rng(3)
+    rows, width = 30, 0.3
+    names = ["remainder.torque.0.0", "remainder.torque.0.1", "remainder.torque.0.0@last"]
+    X, y = rng.standard_normal((rows, 3)), rng.standard_normal(rows)
+    M = np.array([[40.0, 3.0], [3.0, 2.0]])
+    gram = np.column_stack([X, y]).T @ np.column_stack([X, y])
+    ladder = SimpleNamespace(
+        blocks=lambda *a, remainders, **k: [White("last", "torque", names, gram, rows)] if remainders else [],
+        recordings=["last"],
+    )
+    candidate = Candidate(
+        np.arange(3), np.zeros(3), np.ones(3), np.zeros(3, int), (width,), [*names[:2], "remainder.torque.0.0@first"]
+    )
+    search = SimpleNamespace(
+        candidates={("remainder:torque", 0): candidate}, units={"remainder:torque": unit("r", "torque", kind="remainder")},
+        reduced=Reduced(names[:2], M, np.zeros(2), 0.0, np.zeros(2)),
+    )  # fmt: skip
+    bench = SimpleNamespace(inserted=lambda m, normal: SimpleNamespace(values={}))
+    left = Model((Choice("remainder:torque", 0, width),), 0.0, 0.0, {}, {})
+    found = held_out._misfit(ladder, bench, SimpleNamespace(search=search, normal=None), left)
+    posterior = np.zeros((3, 3))
+    posterior[:2, :2] = np.linalg.inv(M + np.eye(2) / width**2)
+    posterior[2, 2] = width**2
+    covariance = np.eye(rows) + X @ posterior @ X.T
+    assert found == pytest.approx(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1])
 
 
 def test_what_is_named_in_place_of_a_name_is_held_to_account_as_well(monkeypatch):

@@ -12,7 +12,7 @@ from .linear import ROUNDING
 from .model import Block
 from .whitening import Weights, factored, substituted, substituted_back
 
-APART = 1e-4  # of a column's information, that must be left of it once what is free is taken out
+APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
 Shape = Mapping[str, float]
 Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
 

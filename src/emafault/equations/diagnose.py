@@ -128,7 +128,7 @@ def diagnose(
     named = read(all_fit.models, units, observed).named
     models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
-    final = read(models, units, observed, counted=bool(told(recordings)), wandering=wandering.log_odds(every))
+    final = read(models, units, observed, counted=bool(told(recordings)), wandering=wandering.log_odds(every, confirm))
     return _diagnosed(
         name, split, whole, every, all_fit, final, sealed, HeldOut(ladder, bench, fit, ratios, changes), recordings, own
     )

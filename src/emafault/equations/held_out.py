@@ -8,15 +8,13 @@ from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
 from ..diagnosis.constancy import log_odds_of_change
+from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
-from ..diagnosis.naming import NAMED
+from ..diagnosis.naming import NAMED, PRESENT
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Model, inclusion
-
-CLEAR = 3.0  # nats of predictive density, by which a member has been seen to help or to harm (Kass and Raftery 1995,
-# JASA 90, 773)
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ def held_to_account(
     What has another size in each recording is held to account likewise: see ``constancy``.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
-    it.
+    it; so is a remainder, which takes up whatever the model has of the noise wrong.
 
     Returns
     -------
@@ -60,6 +58,11 @@ def held_to_account(
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
     account = _Account(ladder, explored, fit, named)
+    for remainder in _untold(models, ratios, lambda u: whole.search.units[u].kind == "remainder", PRESENT):
+        ratios[remainder] = account.of_remainder(remainder)
+        if ratios[remainder] < CLEAR:
+            moved = _moved(whole, models, remainder, False, _log_mass(models, remainder))
+            models[:] = [*(m for m in models if remainder not in m.units), *moved]
     for effect in _untold(models, ratios, lambda u: whole.search.units[u].kind in LISTED):
         ratios[effect] = account.ratio(effect)
         if ratios[effect] < -CLEAR:
@@ -81,10 +84,12 @@ def held_to_account(
     return sorted(models, key=lambda m: -m.log_posterior), ratios, changes
 
 
-def _untold(models: list[Model], ratios: Mapping[str, float], which: Callable[[str], bool]) -> Iterator[str]:
-    """Units that the sets, as they are by then, would name, and that have not been held to account."""
+def _untold(
+    models: list[Model], ratios: Mapping[str, float], which: Callable[[str], bool], told: float = NAMED
+) -> Iterator[str]:
+    """Units that the sets, as they are by then, would tell, and that have not been held to account."""
     while True:
-        left = [u for u, p in inclusion(models).items() if p >= NAMED and u not in ratios and which(u)]
+        left = [u for u, p in inclusion(models).items() if p >= told and u not in ratios and which(u)]
         if not left:
             return
         yield left[0]
@@ -112,6 +117,14 @@ class _Account:
             mine = [(c.unit, c.variant) for c in self.base.choices if c.unit != unit]
             mine += [(c.unit, c.variant) for c in first.choices if c.unit == unit]
             inside = self.fit.search.fit(tuple(mine))
+        return self._over_less(inside, unit)
+
+    def of_remainder(self, unit: str) -> float:
+        """Of the likeliest set with a remainder over the same without it; 0 where the explored recordings had none."""
+        first = next((m for m in self.fit.models if unit in m.units), None)
+        return 0.0 if first is None else self._over_less(first, unit)
+
+    def _over_less(self, inside: Model, unit: str) -> float:
         less = self.fit.search.fit(tuple((c.unit, c.variant) for c in inside.choices if c.unit != unit))
         return 0.5 * (self._misfit(less) - self._misfit(inside))
 
@@ -146,26 +159,43 @@ def _less(whole: Fit, model: Model, unit: str, left: bool) -> Model:
 
 
 def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
-    """Sum of the squared whitened residual on the confirm recordings, at a set's fit to the explored ones.
+    """-2 log predictive density of the confirm recordings under a set fitted to the explored ones, up to a constant.
 
-    What a remainder has in each recording by itself is fitted there, under its prior.
+    Remainders are integrated: what all recordings share over the posterior of the explored ones, what each has of its
+    own over its prior.
     """
     inserted = bench.inserted(model, fit.normal)
     also = [n for n in model.deviations if is_parameter(n)]
-    width = {
-        c.unit.split(":", 1)[1]: c.width
-        for c in model.choices
-        if any("@" in n for n in fit.search.candidates[c.unit, c.variant].names) and c.unit.startswith("remainder:")
-    }
-    whites = ladder.blocks(inserted.values, remainders=bool(width), also=also, inserted=inserted)
-    found = _occam(ladder, whites, model, fit)
-    for w in whites:
-        found += float(w.gram[-1, -1])
-        own = [k for k, n in enumerate(w.names) if n.startswith("remainder.") and "@" in n]
-        if own and w.equation in width:
-            M, b = w.gram[np.ix_(own, own)], w.gram[own, -1]
-            found -= float(b @ np.linalg.solve(M + np.eye(len(own)) / width[w.equation] ** 2, b))
-    return found
+    shared, own = _remainders(fit, model)
+    whites = ladder.blocks(inserted.values, remainders=bool(shared or own), also=also, inserted=inserted)
+    found = _occam(ladder, whites, model, fit) + sum(float(w.gram[-1, -1]) for w in whites)
+    if not shared and not own:
+        return found
+    seen = dict.fromkeys(n for w in whites for n in w.names if n.startswith("remainder."))
+    single = [n for n in seen if "@" in n and n.split(".")[1] in own]
+    common = [n for n in seen if n in shared]
+    normal = assemble(whites, [*common, *single], {})
+    precision = np.diag([0.0] * len(common) + [own[n.split(".")[1]] ** -2 for n in single])
+    k = np.array([fit.search.reduced.index[n] for n in common], int)
+    precision[: len(k), : len(k)] = fit.search.reduced.M[np.ix_(k, k)] + np.diag([shared[n] ** -2 for n in common])
+    after = Definite(normal.H + precision)
+    found -= float(normal.g @ after.solve(normal.g))
+    return found + 2.0 * (after.half_log_determinant() - Definite(precision).half_log_determinant())
+
+
+def _remainders(fit: Fit, model: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """Prior standard deviations of a set's remainders: by column that all recordings share, and by equation of which
+    each recording has columns of its own."""
+    shared, own = {}, {}
+    for c in model.choices:
+        candidate = fit.search.candidates[c.unit, c.variant]
+        if fit.search.units[c.unit].kind == "remainder":
+            for n, sd in zip(candidate.names, c.width * candidate.sd, strict=True):
+                if "@" in n:
+                    own[n.split(".")[1]] = float(sd)
+                else:
+                    shared[n] = float(sd)
+    return shared, own
 
 
 def _occam(ladder: Ladder, whites: Sequence[White], model: Model, fit: Fit) -> float:

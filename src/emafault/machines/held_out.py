@@ -7,14 +7,13 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..diagnosis.closure import closed, placebo, rms, rows
+from ..diagnosis.evidence import CLEAR
 from ..diagnosis.linear import White, assemble, own_columns, remainder_columns
 from ..diagnosis.point import is_parameter
 from .adapter import Recorded
 
 if TYPE_CHECKING:
     from .diagnose import Fitted
-
-CLEAR = 3.0  # nats of predictive density, by which a set has been seen to help or to harm
 
 
 def ladder(explored: "Fitted", opened: Recorded, confirm: Sequence[str]) -> dict[str, float | None]:
