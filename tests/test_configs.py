@@ -178,7 +178,7 @@ def test_draws_of_blind_cases_share_none(monkeypatch):
     read = config._withheld_draw
     overlapping = {"brief": {"cases": {"T1": 5}, "first_seed": 30010}}
     monkeypatch.setattr(config, "_withheld_draw", lambda draw: read(draw) | overlapping.get(draw, {}))
-    with pytest.raises(InputError, match="brief and standard share seeds 4890 to 4894 of T1"):
+    with pytest.raises(InputError, match="brief and standard share seeds 30010 to 30014 of T1"):
         config.plan()
 
 
