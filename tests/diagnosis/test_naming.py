@@ -82,7 +82,11 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
             candidates={("remainder:torque", 0): None}, units=units,
         ),
     )  # fmt: skip
-    search = SimpleNamespace(fit=lambda members: model(-2.0, *(u for u, _ in members)), units=units)
+    search = SimpleNamespace(
+        fit=lambda members: model(-2.0, *(u for u, _ in members)),
+        less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)), units=units,
+    )  # fmt: skip
+    monkeypatch.setattr(held_out, "tempered", lambda every, whole: list(whole.models))
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
     return held_out.held_to_account(

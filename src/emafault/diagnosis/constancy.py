@@ -40,7 +40,7 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     aliases = bench.columns()[1]
     source = {n: aliases.get(n, n) for n in mine}
     own = {n: [_of(unit, n, r) for r in bench.recordings] for n in mine}
-    prior = _prior(fit, model)
+    prior = prior_of(fit, model)
     rest = [n for n in prior if n not in mine and not n.startswith(f"own.{unit}.")]
     names = [*bench.nuisances, *rest, *mine, *(o for each in own.values() for o in each)]
     whites = [_split(w, unit, source) for w in fit.whites]
@@ -82,7 +82,7 @@ def _split(white: White, unit: str, source: dict[str, str]) -> White:
     return replace(white, names=names, gram=white.gram[np.ix_(k, k)], noise=noise)
 
 
-def _prior(fit: Fit, model: Model) -> dict[str, tuple[float, float]]:
+def prior_of(fit: Fit, model: Model) -> dict[str, tuple[float, float]]:
     """Mean and standard deviation of a set's columns, by name."""
     names: Sequence[str] = fit.search.reduced.names
     out: dict[str, tuple[float, float]] = {}

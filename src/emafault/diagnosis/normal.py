@@ -68,7 +68,7 @@ class NormalEquations(Point):
         left = None
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        return Task(self.values(), wanted, left, self._amounts(model), corrected=corrected)
+        return Task(self.values(), wanted, left, self.amounts(model), corrected=corrected)
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""
@@ -122,7 +122,7 @@ class NormalEquations(Point):
                 out.append((block.equation, rows[:, :-1] @ d, block.coordinates))
         return out
 
-    def _amounts(self, model: Model | None) -> dict[str, dict[str, float]]:
+    def amounts(self, model: Model | None) -> dict[str, dict[str, float]]:
         """Sizes from off, by column, of the units that carry their own form."""
         out = {}
         for unit in self.units:

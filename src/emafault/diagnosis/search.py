@@ -104,8 +104,11 @@ class Search:
     def fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None = None) -> Model:
         """The set's posterior, each member's width the best of its mixture."""
         members = tuple(sorted(members))
-        if members in self.seen:
-            return self.seen[members]
+        if members not in self.seen:
+            self.seen[members] = self._fit(members, widths)
+        return self.seen[members]
+
+    def _fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None) -> Model:
         width = {m: (widths or {}).get(m) or self._usual(m) for m in members}
         best = self._evidence(members, width)
         for m in members:
@@ -119,15 +122,21 @@ class Search:
         value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
         value -= sum(np.log(self.variants(m[0])) for m in members)
         names = [self.reduced.names[k] for k in index]
-        model = Model(
+        return Model(
             tuple(Choice(m[0], m[1], width[m]) for m in members),
             self.tempering * value + self.log_prior(members),
             value,
             dict(zip(names, mean.tolist(), strict=True)),
             dict(zip(names, deviation.tolist(), strict=True)),
         )
-        self.seen[members] = model
-        return model
+
+    def less(self, model: Model, unit: str) -> Model:
+        """The set less a unit, the others' priors as wide as they are or as they were when it was looked at first."""
+        width = {(c.unit, c.variant): c.width for c in model.choices if c.unit != unit}
+        members = tuple(sorted(width))
+        before, again = self.fit(members, width), self._fit(members, width)
+        self.seen[members] = max(before, again, key=lambda m: m.log_posterior)
+        return self.seen[members]
 
     def wide(self, model: Model) -> Model:
         """The same set under the widest priors, whose estimates are shrunk the least."""

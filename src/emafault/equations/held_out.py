@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
 from ..diagnosis.constancy import log_odds_of_change
+from ..diagnosis.dispersion import tempered
 from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
@@ -37,6 +38,8 @@ def held_to_account(
 ) -> tuple[list[Model], dict[str, float], dict[str, float]]:
     """Sets of all recordings, those less likely that hold what makes the confirm recordings worse.
 
+    What is told because the noise scatters by more than its model allows for is told by less: see ``dispersion``.
+
     The explored recordings are fitted with a named effect and without; both predict the confirm recordings, frozen. One
     whose prediction is clearly the worse has the odds that the explored recordings gave it times the ratio of the
     predictive densities (Bayes' rule one part of the data after the other), instead of those of all data together. What
@@ -54,7 +57,7 @@ def held_to_account(
     sets, most probable first, log predictive ratio by effect and form, and by effect the log odds that it has another
     size in each recording
     """
-    models = list(whole.models)
+    models = tempered(every, whole)
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
     account = _Account(ladder, explored, fit, named)
@@ -125,8 +128,7 @@ class _Account:
         return 0.0 if first is None else self._over_less(first, unit)
 
     def _over_less(self, inside: Model, unit: str) -> float:
-        less = self.fit.search.fit(tuple((c.unit, c.variant) for c in inside.choices if c.unit != unit))
-        return 0.5 * (self._misfit(less) - self._misfit(inside))
+        return 0.5 * (self._misfit(self.fit.search.less(inside, unit)) - self._misfit(inside))
 
     def _misfit(self, model: Model) -> float:
         if model.choices not in self.misfits:

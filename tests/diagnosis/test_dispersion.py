@@ -1,0 +1,72 @@
+"""What a unit is told by, over what its score scatters by."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis import dispersion
+from emafault.diagnosis.dispersion import overdispersion, tempered
+from emafault.diagnosis.fit import Bench
+from emafault.diagnosis.model import Block, Parameter, Unit, Variant
+from emafault.diagnosis.search import Choice, Model, Search
+from emafault.diagnosis.whitening import Weights
+
+ROWS = 2000
+DRAG = Parameter("drag.c", 0.0, 0.0, 1.0)
+
+
+class Machine:
+    """A coefficient of a driver, and a level, in white noise and a burst that goes with the driver at times."""
+
+    forms = ()
+    units = (Unit("drag", "structural", ("torque",), [Variant([DRAG])]),)
+    parameters = {"drag.c": DRAG, "level": Parameter("level", 0.0, 0.0, 0.1)}  # noqa: RUF012
+
+    def __init__(self, burst):
+        self.noise, self.driver = {}, {}
+        for k in range(4):
+            rng = np.random.default_rng(k)
+            self.driver[f"r{k}"] = rng.standard_normal(ROWS)
+            comes_and_goes = np.repeat(rng.standard_normal(ROWS // 100), 100)
+            self.noise[f"r{k}"] = rng.standard_normal(ROWS) + burst * comes_and_goes * self.driver[f"r{k}"]
+
+    def blocks(self, values, recording, wanted=None, disturbed=False):
+        driver = self.driver[recording]
+        residual = self.noise[recording] - 0.1 * driver + values["drag.c"] * driver + values["level"]
+        columns = {"drag.c": driver, "level": np.ones(ROWS)}
+        return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+
+def fitted(burst):
+    """Such a bench, its fit, and the set with the coefficient."""
+    machine = Machine(burst)
+    bench = Bench(machine, list(machine.noise))
+    white = Weights(np.ones(ROWS, bool), np.zeros(0), np.ones(ROWS))
+    bench.carried = {n: {"torque": white} for n in machine.noise}
+    drag = Model((Choice("drag", 0, 1.0),), 0.0, 0.0, {}, {})
+    normal = bench.normal(bench.linearise(drag, corrected=False), drag)
+    reduced = bench.reduce(normal)
+    search = Search(reduced, *bench.candidates(reduced))
+    search.run()
+    return bench, SimpleNamespace(normal=normal, search=search, models=search.ranked()), search.fit((("drag", 0),))
+
+
+def test_a_score_in_noise_as_stated_is_not_dispersed():
+    assert overdispersion(*fitted(0.0), "drag") == 1.0
+
+
+def test_what_comes_and_goes_along_a_unit_disperses_its_score():
+    """100 rows of variance 1 have a score of variance 100; the burst's adds (100 burst)^2, of which two share a part."""
+    found = overdispersion(*fitted(0.5), "drag")
+    assert found == pytest.approx(1.0 + 0.25 * 100.0, rel=0.5)
+
+
+def test_a_likelihood_ratio_is_divided_by_the_dispersion(monkeypatch):
+    bench, fit, drag = fitted(0.0)
+    gain = drag.log_likelihood - fit.search.fit(()).log_likelihood
+    assert gain > 20.0 and tempered(bench, fit) == fit.models
+    monkeypatch.setattr(dispersion, "overdispersion", lambda bench, fit, model, unit: 4.0)
+    by_units = {m.units: m.log_posterior for m in tempered(bench, fit)}
+    assert by_units["drag",] == pytest.approx(drag.log_posterior - 0.75 * gain)
+    assert by_units[()] == fit.search.fit(()).log_posterior
