@@ -57,7 +57,7 @@ def test_a_score_in_noise_as_stated_is_not_dispersed():
 
 
 def test_what_comes_and_goes_along_a_unit_disperses_its_score():
-    """100 rows of variance 1 have a score of variance 100; the burst's adds (100 burst)^2, of which two share a part."""
+    """100 rows of variance 1 have a score of variance 100, to which a burst adds its square times 100^2."""
     found = overdispersion(*fitted(0.5), "drag")
     assert found == pytest.approx(1.0 + 0.25 * 100.0, rel=0.5)
 

@@ -161,7 +161,8 @@ def test_remainders_are_integrated_over_what_the_explored_recordings_leave_open(
         np.arange(3), np.zeros(3), np.ones(3), np.zeros(3, int), (width,), [*names[:2], "remainder.torque.0.0@first"]
     )
     search = SimpleNamespace(
-        candidates={("remainder:torque", 0): candidate}, units={"remainder:torque": unit("r", "torque", kind="remainder")},
+        candidates={("remainder:torque", 0): candidate},
+        units={"remainder:torque": unit("r", "torque", kind="remainder")},
         reduced=Reduced(names[:2], M, np.zeros(2), 0.0, np.zeros(2)),
     )  # fmt: skip
     bench = SimpleNamespace(inserted=lambda m, normal: SimpleNamespace(values={}))
