@@ -15,6 +15,7 @@ COMMANDS = {
     "simulate": "simulate one recording of an actuator with a given fault",
     "identify": "identify the fault vector in recordings",
     "diagnose": "say where a simulator and a bench disagree, which effect causes it and how far it explains it",
+    "plan": "say what to record next on a bench, and write the motions for it to play",
 }
 
 

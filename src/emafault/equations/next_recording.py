@@ -76,6 +76,7 @@ def next_recordings(
                         "command": f"{command}, {text}, {duration:g} s", "ambient_temperature": ambient,
                         "separates": ["+".join(named) or "no_gap", "+".join(names) or "no_gap"],
                         "expected_odds": float(np.exp(np.clip(gain, 0.0, np.log(LARGEST_ODDS)))),
+                        "motion": {"name": command, "duration": duration, "settings": dict(settings)},
                     }
                 )  # fmt: skip
     best: dict[str, dict[str, Any]] = {}

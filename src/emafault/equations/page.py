@@ -181,7 +181,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
     rows = [
         [
             e["command"], f"{e['ambient_temperature']:g} °C",
-            " from ".join(s.replace("_", " ").replace("+", " + ") for s in e["separates"]), f"{e['expected_odds']:.3g}",
+            separated(e["separates"]), f"{e['expected_odds']:.3g}",
         ]
         for e in verdict["next_experiment"]
     ]  # fmt: skip
@@ -189,6 +189,20 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
     page.heading("Sealed before the confirming recordings were opened")
     page.parts.append(f"<pre>{html.escape(json.dumps(verdict['sealed'], indent=1))}</pre>")
     return page
+
+
+def separated(sets: Sequence[str]) -> str:
+    """What a recording would tell: the leading set from a rival, each as the verdict file joins its effects."""
+    first, rival = (s.split("+") for s in sets)
+    more = [e for e in rival if e not in first]
+    words = {
+        k: " and ".join(e.replace("_", " ") for e in v) for k, v in (("one", first), ("two", rival), ("more", more))
+    }
+    if set(first) < set(rival) or first == ["no_gap"]:
+        return f"whether {words['more']} act{'s' if len(more) == 1 else ''}" + (
+            " as well" if set(first) < set(rival) else ""
+        )
+    return f"{words['one']} from {words['two'] if rival != ['no_gap'] else 'no gap'}"
 
 
 def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
