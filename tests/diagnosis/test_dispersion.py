@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from emafault.diagnosis import dispersion
-from emafault.diagnosis.dispersion import overdispersion, tempered
+from emafault.diagnosis.dispersion import overdispersion
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Choice, Model, Search
@@ -60,13 +59,3 @@ def test_what_comes_and_goes_along_a_unit_disperses_its_score():
     """100 rows of variance 1 have a score of variance 100, to which a burst adds its square times 100^2."""
     found = overdispersion(*fitted(0.5), "drag")
     assert found == pytest.approx(1.0 + 0.25 * 100.0, rel=0.5)
-
-
-def test_a_likelihood_ratio_is_divided_by_the_dispersion(monkeypatch):
-    bench, fit, drag = fitted(0.0)
-    gain = drag.log_likelihood - fit.search.fit(()).log_likelihood
-    assert gain > 20.0 and tempered(bench, fit) == fit.models
-    monkeypatch.setattr(dispersion, "overdispersion", lambda bench, fit, model, unit: 4.0)
-    by_units = {m.units: m.log_posterior for m in tempered(bench, fit)}
-    assert by_units["drag",] == pytest.approx(drag.log_posterior - 0.75 * gain)
-    assert by_units[()] == fit.search.fit(()).log_posterior

@@ -69,7 +69,7 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
-def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0):
+def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0, dispersion=1.0):
     """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
     units = {
         "load_spring": unit("load_spring", "torque"), "~order": unit("~order", "torque", kind="form"),
@@ -78,7 +78,7 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
     everything = SimpleNamespace(
         models=whole,
         search=SimpleNamespace(
-            fit=lambda members: model(-50.0, *(u for u, _ in members)),
+            fit=lambda members: model(-50.0, *(u for u, _ in members)), log_prior=lambda members: -2.0 * len(members),
             candidates={("remainder:torque", 0): None}, units=units,
         ),
     )  # fmt: skip
@@ -86,7 +86,7 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
         fit=lambda members: model(-2.0, *(u for u, _ in members)),
         less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)), units=units,
     )  # fmt: skip
-    monkeypatch.setattr(held_out, "tempered", lambda every, whole: list(whole.models))
+    monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
     return held_out.held_to_account(
@@ -113,6 +113,15 @@ def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypat
     assert changes == {"load_spring": 4.0} and kept[0].units == ("remainder:torque",)
     named = [m for m in kept if "load_spring" in m.units]
     assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(4.0)
+
+
+def test_a_name_whose_score_is_overdispersed_is_told_by_less(monkeypatch):
+    misfit = {("load_spring",): 80.0, (): 100.0}
+    whole, explored = [model(0.0, "load_spring"), model(-10.0)], [model(0.0, "load_spring"), model(-2.0)]
+    kept, _, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"], dispersion=4.0)
+    odds = np.logaddexp.reduce([m.log_posterior for m in kept if "load_spring" in m.units])
+    odds -= np.logaddexp.reduce([m.log_posterior for m in kept if not m.units])
+    assert odds == pytest.approx(-2.0 + 12.0 / 4.0, abs=1e-3)  # odds of the prior, and a quarter of the ratio
 
 
 @pytest.mark.parametrize(("after", "told"), [(99.0, False), (80.0, True)])

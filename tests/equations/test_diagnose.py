@@ -138,6 +138,20 @@ def test_samples_that_clip_are_left_out_and_told(cogging):
     assert [d["form"] for d in verdict["discovered"]] == ["clipping"]
 
 
+def test_spikes_are_left_out_and_told(cogging):
+    spiked = {n: replace(r, phase_current=r.phase_current.copy()) for n, r in bench(COGGING).items()}
+    first = spiked[next(iter(spiked))].phase_current
+    first[np.random.default_rng(2).choice(np.arange(2, len(first) - 2, 4), 30, replace=False), 0] += 5.0
+    verdict = verdict_of(spiked)
+    assert [d["form"] for d in verdict["discovered"]] == ["spikes"]
+    share = verdict["discovered"][0]["parameters"]["share"]["value"]
+    assert share == pytest.approx(30.0 / len(first), rel=0.01)
+    assert verdict["quality"][next(iter(spiked))]["phase_current"]["spikes"] == share
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    amplitude, same = (v["which"][0]["parameters"]["a"] for v in (verdict, cogging))
+    assert amplitude["value"] == pytest.approx(same["value"], abs=0.2 * (same["high"] - same["low"]))
+
+
 def test_names_and_order_of_files_change_nothing(cogging):
     recordings = bench(COGGING)
     renamed = {f"x{9 - n}.nc": r for n, r in enumerate(recordings.values())}

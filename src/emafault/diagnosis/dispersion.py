@@ -8,7 +8,6 @@ Biometrika 73, 13).
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,44 +17,11 @@ from .fit import Bench, Fit
 from .linear import white_rows
 from .model import SETTINGS
 from .point import is_parameter
-from .search import Model, inclusion
+from .search import Model
 from .whitening import filtered
 
-LIKELY = 0.02  # inclusion, from which a unit is asked
 PARTS = 10  # of a recording
 CHANCE = 2.0  # standard deviations of the variance over that expected, up to which it is taken for chance
-
-
-def tempered(bench: Bench, fit: Fit) -> list[Model]:
-    """Sets of a fit, most probable first, whose units' likelihood ratios are divided by their overdispersion.
-
-    Every likely unit is asked, those too that become likely in consequence. In a set with several, the most dispersed
-    is taken out first: each has the ratio of what the set is with it to what it is without.
-    """
-    models = list(fit.models)
-    found: dict[str, float] = {}
-    while True:
-        likely = [u for u, p in inclusion(models).items() if p >= LIKELY and u not in found]
-        likely = [u for u in likely if fit.search.units[u].kind != "remainder"]
-        if not likely:
-            return models
-        for unit in likely:
-            found[unit] = overdispersion(bench, fit, next(m for m in models if unit in m.units), unit)
-        for _ in range(2):  # the sets less their dispersed units are looked at in the first
-            models = [_tempered(fit, m, found) for m in fit.search.ranked()]
-        models.sort(key=lambda m: -m.log_posterior)
-
-
-def _tempered(fit: Fit, model: Model, dispersion: Mapping[str, float]) -> Model:
-    left, lost = model, 0.0
-    for unit in sorted(model.units, key=lambda u: -dispersion.get(u, 1.0)):
-        if dispersion.get(unit, 1.0) == 1.0:
-            break
-        less = fit.search.less(left, unit)
-        gain = left.log_likelihood - less.log_likelihood
-        lost += max(gain, 0.0) * (1.0 - 1.0 / dispersion[unit])
-        left = less
-    return replace(model, log_posterior=model.log_posterior - lost)
 
 
 def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
@@ -69,6 +35,19 @@ def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
     bench : at the point of the fit
     model : a set of the fit that holds the unit
     """
+    found, known = 0.0, []
+    for parts in _scores(bench, fit, model, unit).values():
+        s, information, rows = np.array(parts).T
+        # the noise that columns and residual share biases every row of an equation alike
+        found += float(np.sum((s - rows * (s.sum() / max(rows.sum(), 1.0))) ** 2))
+        known += information.tolist()
+    expected = float(np.sum(known))
+    chance = float(np.sqrt(2.0 * np.sum(np.square(known))))  # of squares of independent Gaussian scores
+    return found / expected if found > expected + CHANCE * chance else 1.0
+
+
+def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[tuple[float, float, int]]]:
+    """Score of a unit, its variance if the noise's model holds, and number of rows, of each part by equation."""
     aliases = bench.columns()[1]
     of_unit = next(c for c in model.choices if c.unit == unit)
     added = {n: model.deviations[n] - bench.prior(n)[2] for n in bench.names_of(of_unit)}
@@ -78,7 +57,7 @@ def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
     wanted = [n for n in dict.fromkeys([*residual, *score]) if is_parameter(n)]
     acting = [aliases.get(n, n) for n in added]
     own = bench.amounts(model)
-    found, known = 0.0, []
+    out: dict[str, list[tuple[float, float, int]]] = {}
     for name in bench.recordings:
         for block in bench.machine.blocks(bench.values(), name, wanted=set(wanted)):
             weights = bench.carried[name].get(block.equation)
@@ -89,12 +68,10 @@ def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
             rows = filtered(rows, weights)
             r = rows[:, -1] + rows[:, :-1] @ np.array([residual.get(n, 0.0) for n in names])
             x = rows[:, :-1] @ np.array([score.get(n, 0.0) for n in names])
-            for part in np.array_split(np.flatnonzero(weights.usable), PARTS):
-                found += float(x[part] @ r[part]) ** 2
-                known.append(float(x[part] @ x[part]))
-    expected = float(np.sum(known))
-    chance = float(np.sqrt(2.0 * np.sum(np.square(known))))  # of squares of independent Gaussian scores
-    return found / expected if found > expected + CHANCE * chance else 1.0
+            parts = np.array_split(np.flatnonzero(weights.usable), PARTS)
+            mine = [(float(x[p] @ r[p]), float(x[p] @ x[p]), len(p)) for p in parts]
+            out.setdefault(block.equation, []).extend(mine)
+    return out
 
 
 def _by_column(amounts: Mapping[str, float], aliases: Mapping[str, str]) -> dict[str, float]:

@@ -10,9 +10,9 @@ import numpy as np
 from ..diagnosis.forms import FORMS
 from ..errors import InputError
 from ..io.recording import Recording, write_recording
+from ..io.sensors import without_spikes
 from .acquisition import advanced, delayed, full_range
 from .diagnose import Diagnosed
-from .quality import spiked
 
 Undo = Callable[[Recording], Recording]
 #: forms that a voltage of one phase has from its channel: nothing in the machine makes them
@@ -149,9 +149,4 @@ def _currents(recording: Recording, of: Callable[[np.ndarray], np.ndarray]) -> R
 
 
 def _without_spikes(recording: Recording) -> Recording:
-    current = recording.phase_current.copy()
-    rows = np.flatnonzero(spiked(current.sum(axis=1))) + 1
-    bend = np.abs(current[rows] - 0.5 * (current[rows - 1] + current[rows + 1]))
-    phase = np.argmax(bend, axis=1)
-    current[rows, phase] = 0.5 * (current[rows - 1, phase] + current[rows + 1, phase])
-    return replace(recording, phase_current=current)
+    return replace(recording, phase_current=without_spikes(recording.phase_current)[0])

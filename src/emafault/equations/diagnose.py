@@ -29,7 +29,7 @@ from .how_far import null, shrinks
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .point import SEEDED
-from .quality import told
+from .quality import at_a_glance, seen, told
 from .signals import Signals, estimated_noise
 from .telling import EQUATION, Z
 from .terms import TERMS
@@ -109,14 +109,15 @@ def diagnose(
         fit = bench.fit((begun, begun.fit()))
     else:
         fit = bench.fit()
-    counted = bool(told({n: recordings[n] for n in explore}))
+    quality = {n: seen(recordings[n]) for n in explore}
+    counted = bool(told(quality))
     reading = read(
         fit.models, fit.search.units.values(), tuple(machine.observed()), counted=counted,
         wandering=wandering.log_odds(bench),
     )  # fmt: skip
     sealed = _seal(reading)
     if not confirm:
-        return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own)
+        return _diagnosed(name, split, machine, bench, fit, reading, sealed, None, recordings, own, quality)
     # from here on the confirm recordings are open
     known = machine.recordings
     signals = {n: known[n] if n in known else Signals.of(n, r, actuator, own) for n, r in recordings.items()}
@@ -128,10 +129,10 @@ def diagnose(
     named = read(all_fit.models, units, observed).named
     models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit)
     all_fit = replace(all_fit, models=models)
-    final = read(models, units, observed, counted=bool(told(recordings)), wandering=wandering.log_odds(every, confirm))
-    return _diagnosed(
-        name, split, whole, every, all_fit, final, sealed, HeldOut(ladder, bench, fit, ratios, changes), recordings, own
-    )
+    quality = {n: quality[n] if n in quality else seen(r) for n, r in recordings.items()}
+    final = read(models, units, observed, counted=bool(told(quality)), wandering=wandering.log_odds(every, confirm))
+    held_out = HeldOut(ladder, bench, fit, ratios, changes)
+    return _diagnosed(name, split, whole, every, all_fit, final, sealed, held_out, recordings, own, quality)
 
 
 def _spread(recordings: Mapping[str, Recording], names: Sequence[str]) -> list[str]:
@@ -160,7 +161,7 @@ def _seal(reading: Reading) -> dict[str, Any]:
 
 
 def _diagnosed(
-    name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings, noise
+    name, split, machine, bench: Bench, fit: Fit, reading: Reading, sealed, held_out, recordings, noise, quality
 ) -> Diagnosed:
     best = (
         reading.sets[0][2]
@@ -179,7 +180,8 @@ def _diagnosed(
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
     changes = held_out.changes if held_out else {}
-    verdict["discovered"] = [*told(recordings), *_discovered(bench, machine, reading, best, fit.search, changes)]
+    verdict["discovered"] = [*told(quality), *_discovered(bench, machine, reading, best, fit.search, changes)]
+    verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
     posterior = _covariance(bench, fit, best)

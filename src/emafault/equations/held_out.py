@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
 from ..diagnosis.constancy import log_odds_of_change
-from ..diagnosis.dispersion import tempered
+from ..diagnosis.dispersion import overdispersion
 from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
@@ -38,7 +38,8 @@ def held_to_account(
 ) -> tuple[list[Model], dict[str, float], dict[str, float]]:
     """Sets of all recordings, those less likely that hold what makes the confirm recordings worse.
 
-    What is told because the noise scatters by more than its model allows for is told by less: see ``dispersion``.
+    What is told because the noise scatters by more than its model allows for has its likelihood ratio divided by the
+    overdispersion of its score, and what it loses goes to the same set without it: see ``dispersion``.
 
     The explored recordings are fitted with a named effect and without; both predict the confirm recordings, frozen. One
     whose prediction is clearly the worse has the odds that the explored recordings gave it times the ratio of the
@@ -57,7 +58,7 @@ def held_to_account(
     sets, most probable first, log predictive ratio by effect and form, and by effect the log odds that it has another
     size in each recording
     """
-    models = tempered(every, whole)
+    models = list(whole.models)
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
     account = _Account(ladder, explored, fit, named)
@@ -74,13 +75,15 @@ def held_to_account(
                 mass = _log_mass(models, effect)
                 models += _moved(whole, models, effect, True, float(mass - odds))
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
+        models += _dispersed(every, whole, models, leading, effect)
         changes[effect] = log_odds_of_change(every, whole, leading, effect)
         models += _moved(whole, models, effect, True, _log_mass(models, effect) + changes[effect])
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)
+        leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
+        models += _dispersed(every, whole, models, leading, form)
         if ratios[form] < CLEAR:
-            leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
             left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
             moved = _moved(whole, models, form, left, _log_mass(models, form))
             models[:] = [*(m for m in models if form not in m.units), *moved]
@@ -148,6 +151,17 @@ def _moved(whole: Fit, models: Sequence[Model], unit: str, left: bool, mass: flo
     likely = [m for m in mine if m.log_posterior > top - NEAR]
     all_of = logsumexp([m.log_posterior for m in likely])
     return [replace(_less(whole, m, unit, left), log_posterior=float(m.log_posterior - all_of + mass)) for m in likely]
+
+
+def _dispersed(every: Bench, whole: Fit, models: Sequence[Model], leading: Model, unit: str) -> list[Model]:
+    """The likely sets with a unit, each less that one, with what it loses where its score is overdispersed."""
+    members = [(c.unit, c.variant) for c in leading.choices]
+    prior = whole.search.log_prior(members) - whole.search.log_prior([m for m in members if m[0] != unit])
+    gain = _log_odds(models, unit) - prior
+    dispersion = overdispersion(every, whole, leading, unit) if 0.0 < gain < np.inf else 1.0
+    if dispersion == 1.0:
+        return []
+    return _moved(whole, models, unit, False, _log_mass(models, unit) - (prior + gain / dispersion))
 
 
 def _less(whole: Fit, model: Model, unit: str, left: bool) -> Model:

@@ -5,13 +5,17 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..faults import FAULT_NAMES
 from ..reporting.page import Page
 from ..reporting.retrained import MARKS
 from .diagnose import TELLING, TOLD
 from .electrical import NAMES
+from .quality import CHANNELS
 from .terms import TERMS
 
+ROWS = 12  # recordings in the picture of their quality
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
 MOST = 8  # sets in the table
@@ -127,6 +131,12 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
                 "described", figures.draw_described(curves),
                 "What the equation leaves along the form, without it in the model and with it, with 90 % bands.",
             )  # fmt: skip
+    page.heading("How good the recordings are")
+    page.figure(
+        "quality", figures.draw_quality(*_quality(verdict["quality"])),
+        "Noise of each channel (of the voltages, with the inverter's ripple), coloured by how it compares with that of "
+        "most recordings (orange: more), and what share of the samples is no measurement.",
+    )  # fmt: skip
     page.heading("Where: residual by equation and operating region")
     rows = [
         [
@@ -225,6 +235,37 @@ def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
             }
         )  # fmt: skip
     return out
+
+
+def _quality(quality: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[list[str], list[str], list[list[dict]]]:
+    """Rows, columns and cells of the picture of the recordings' quality, the worst recordings of many."""
+    most = {
+        channel: float(np.median([q[channel]["noise"] for q in quality.values() if channel in q]))
+        for channel in CHANNELS
+    }
+    channels = [c for c in CHANNELS if any(c in q for q in quality.values())]
+    rows = {name: [_cell(q.get(c), c, most[c]) for c in channels] for name, q in quality.items()}
+    worst = sorted(rows, key=lambda n: (-sum(c["fault"] for c in rows[n]), -max(c["relative"] for c in rows[n])))
+    shown = [n for n in rows if n in set(worst[:ROWS])]
+    titles = [CHANNELS[c][1] for c in channels]
+    return shown, titles, [rows[n] for n in shown]
+
+
+def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[str, Any]:
+    if found is None:
+        return {"text": "not recorded", "relative": 1.0, "fault": False}
+    units = CHANNELS[channel][2]
+    faults = [
+        text.format(100.0 * found[k] if share else found[k], units)
+        for k, share, text in (
+            ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
+            ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
+        )
+        if k in found
+    ]  # fmt: skip
+    noise = f"{found['noise']:.2g} {units}"
+    relative = found["noise"] / most if most > 0.0 else 1.0
+    return {"text": ", ".join(faults) or noise, "relative": relative, "fault": bool(faults)}
 
 
 def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:

@@ -1,13 +1,14 @@
 """What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_dilation
 
 from ..io.recording import Recording
-from ..io.sensors import cut_off
+from ..io.sensors import cut_off, spikes
 from .signals import lattice_step
 
 CHANNELS = {
@@ -16,69 +17,104 @@ CHANNELS = {
     "bus_voltage": ("bus", "bus voltage", "V"),
     "output_position": ("position", "output position", "rad"),
 }
+SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
 HELD = 3  # samples equal to the one before, which a channel with noise never shows
-SPIKE = 10.0  # robust standard deviations of a second difference
-FEWEST = 3  # spikes in a recording
 
 
-def told(recordings: Mapping[str, Recording]) -> list[dict[str, Any]]:
-    """Clipping, steps, held samples and spikes as entries of ``discovered``."""
+@dataclass(frozen=True)
+class Channel:
+    """What a channel of a recording shows by itself.
+
+    ``noise``: standard deviation, robust, from third differences, in which the motion hardly shows, but for the
+    inverter's ripple in the voltages; ``step``: of its
+    converter, 0 where there is none to be seen; ``held``, ``spikes``, ``clipped``: shares of its samples; ``level``: at
+    which it is cut off.
+    """
+
+    noise: float
+    step: float = 0.0
+    held: float = 0.0
+    spikes: float = 0.0
+    clipped: float = 0.0
+    level: float = 0.0
+
+
+def seen(recording: Recording) -> dict[str, Channel]:
+    """What the channels of a recording show, those that it has of ``CHANNELS``."""
+    out = {}
+    cut = cut_off(recording)
+    for channel in CHANNELS:
+        values = getattr(recording, channel)
+        if values is not None:
+            lost = cut.get(channel, np.zeros((len(values), 1), bool))
+            out[channel] = _channel(values.reshape(len(values), -1), lost, channel in SUMMED)
+    return out
+
+
+def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
+    clipped, level = 0.0, 0.0
+    if lost.any():
+        clipped, level = float(lost.any(axis=1).mean()), float(np.abs(values[lost]).max())
+        values = values[~binary_dilation(lost.any(axis=1))]
+    # what the three currents do together is no motion's doing
+    together = values.sum(axis=1)
+    noise = _noise(together) / np.sqrt(values.shape[1]) if summed else float(np.median([_noise(x) for x in values.T]))
+    step = max(lattice_step(x) for x in values.T)
+    if step > 0.0:  # which repeats samples, and stands out, by itself
+        return Channel(noise, step, 0.0, 0.0, clipped, level)
+    held = max(_repeated(x) for x in values.T)
+    rate = len(spikes(together)) / len(values) if summed and not held else 0.0
+    return Channel(noise, 0.0, held, rate, clipped, level)
+
+
+def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
+    """Clipping, steps, held samples and spikes as entries of ``discovered``.
+
+    Parameters
+    ----------
+    quality : what is ``seen``, by recording
+    """
     out = []
-    cut = {name: cut_off(recording) for name, recording in recordings.items()}
     for channel, (equation, words, units) in CHANNELS.items():
-        steps, held, spikes, clipped = {}, {}, {}, {}
-        for name, recording in recordings.items():
-            values = getattr(recording, channel)
-            if values is None:
-                continue
-            lost = cut[name].get(channel, np.zeros(1, bool))
-            if lost.any():
-                clipped[name] = float(np.abs(values[lost]).max())
-                values = values[~binary_dilation(lost.any(axis=1))]
-            columns = values.reshape(len(values), -1).T
-            step = max(lattice_step(x) for x in columns)
-            if step > 0.0:
-                steps[name] = step
-                continue
-            repeated = max(_repeated(x) for x in columns)
-            if repeated:
-                held[name] = repeated
-            if channel in ("phase_current", "bus_voltage"):
-                # what the three currents do together is no motion's doing
-                rate = _spiked(columns.sum(axis=0))
-                if rate:
-                    spikes[name] = rate
+        mine = {name: channels[channel] for name, channels in quality.items() if channel in channels}
         for form, found, parameter, unit, text in (
-            ("clipping", clipped, "level", units, "the {0} channel is cut off at {1:.3g} {2}"),
-            ("adc_step", steps, "step", units, "the {0} channel comes in steps of {1:.3g} {2}"),
-            ("held", held, "share", "1", "the {0} channel repeats {3:.2g} % of its samples"),
-            ("spikes", spikes, "share", "1", "the {0} channel has spikes in {3:.2g} % of its samples"),
-        ):
+            ("clipping", {n: c.level for n, c in mine.items() if c.clipped}, "level", units,
+             "the {0} channel is cut off at {1:.3g} {2}"),
+            ("adc_step", {n: c.step for n, c in mine.items()}, "step", units,
+             "the {0} channel comes in steps of {1:.3g} {2}"),
+            ("held", {n: c.held for n, c in mine.items()}, "share", "1",
+             "the {0} channel repeats {3:.2g} % of its samples"),
+            ("spikes", {n: c.spikes for n, c in mine.items()}, "share", "1",
+             "the {0} channel has spikes in {3:.2g} % of its samples"),
+        ):  # fmt: skip
+            found = {n: x for n, x in found.items() if x}
             if found:
                 value = float(np.median(list(found.values())))
                 out.append(_entry(form, equation, words, parameter, value, unit, text, list(found)))
     return out
 
 
+def at_a_glance(quality: Mapping[str, Mapping[str, Channel]]) -> dict[str, dict[str, dict[str, float]]]:
+    """The same as the verdict file has it: recording -> channel -> what is not zero of it, with its unit."""
+    return {
+        name: {
+            channel: {k: v for k, v in asdict(found).items() if v or k == "noise"}
+            for channel, found in channels.items()
+        }
+        for name, channels in quality.items()
+    }
+
+
+def _noise(x: np.ndarray) -> float:
+    third = np.diff(x, 3)
+    return float(np.median(np.abs(third - np.median(third))) / 0.6745 / np.sqrt(20.0)) if len(third) else 0.0
+
+
 def _repeated(x: np.ndarray) -> float:
     """Share of the samples equal to the one before, where the channel moves otherwise."""
     same = np.diff(x) == 0.0
     return float(same.mean()) if HELD <= same.sum() < 0.5 * len(same) else 0.0
-
-
-def _spiked(x: np.ndarray) -> float:
-    """Share of single samples that stand out of their neighbours."""
-    lone = spiked(x)
-    return float(lone.mean()) if lone.sum() >= FEWEST else 0.0
-
-
-def spiked(x: np.ndarray) -> np.ndarray:
-    """(sample less 2,) which samples but the first and the last stand out of their neighbours by themselves."""
-    bend = x[1:-1] - 0.5 * (x[:-2] + x[2:])
-    scale = np.median(np.abs(bend)) / 0.6745
-    out = np.abs(bend) > SPIKE * scale if scale > 0.0 else np.zeros(len(bend), bool)
-    return out & (np.abs(bend) >= np.abs(np.roll(bend, 1))) & (np.abs(bend) >= np.abs(np.roll(bend, -1)))
 
 
 def _entry(

@@ -11,7 +11,7 @@ from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.recording import Recording
-from ..io.sensors import cut_off
+from ..io.sensors import cut_off, without_spikes
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
@@ -38,7 +38,7 @@ class Signals:
     ambient: float
     health: str
     noise: SensorNoise
-    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off, here or next to it
+    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
@@ -46,8 +46,13 @@ class Signals:
         lost = np.zeros(len(r.time), bool)
         for cut in cut_off(r).values():
             lost |= binary_dilation(cut.any(axis=1))
+        current, rows = without_spikes(r.phase_current)
+        if len(rows):
+            spiked = np.zeros(len(r.time), bool)
+            spiked[rows] = True
+            lost |= binary_dilation(spiked)
         return cls(
-            name, actuator, r.interval, r.phase_voltage, r.phase_current, r.phase_current_end, r.rotor_speed,
+            name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost,
         )  # fmt: skip

@@ -19,6 +19,8 @@ CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme val
 CLIPPED_LEAST = 20
 CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
+SPIKE = 10.0  # robust standard deviations of a second difference
+FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
@@ -219,6 +221,27 @@ def cut_off(recording: Recording) -> dict[str, np.ndarray]:
         if cut.any():
             out[variable] = cut
     return out
+
+
+def spikes(x: np.ndarray) -> np.ndarray:
+    """(spike,) samples of a signal (sample,) that stand out of both their neighbours; none where there are few."""
+    bend = np.zeros(len(x))
+    bend[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    size = np.abs(bend)
+    scale = float(np.median(size[1:-1])) / 0.6745
+    out = np.flatnonzero((size > SPIKE * scale) & (size >= np.roll(size, 1)) & (size >= np.roll(size, -1)))
+    return out if scale > 0.0 and len(out) >= FEWEST_SPIKES else out[:0]
+
+
+def without_spikes(current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Phase currents (sample, phase) less their spikes, which are told from the motion by the sum of the phases: with
+    the mean of both neighbours there; and (spike,) the samples."""
+    rows = spikes(current.sum(axis=1))
+    mean = 0.5 * (current[rows - 1] + current[rows + 1])
+    phase = np.argmax(np.abs(current[rows] - mean), axis=1)
+    out = current.copy()
+    out[rows, phase] = mean[np.arange(len(rows)), phase]
+    return out, rows
 
 
 def _motion(recording: Recording) -> tuple[np.ndarray, np.ndarray]:

@@ -158,3 +158,30 @@ def draw_described(curves: Sequence[Mapping[str, Any]]) -> plt.Figure:
         ax.set_title(c["title"], fontsize=9)
         ax.legend(fontsize=8, frameon=False)
     return fig
+
+
+def draw_quality(
+    rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]
+) -> plt.Figure:
+    """Channels of recordings at a glance: the noise, and shares of samples that are no measurement.
+
+    ``cells`` (row, column): ``text``, and ``relative``, the noise over that of most recordings; ``fault`` where samples
+    are lost.
+    """
+    fig, ax = plt.subplots(figsize=(1.7 * len(columns) + 2.6, 0.44 * len(rows) + 0.9))
+    noise = np.array([[np.log2(max(c["relative"], 1e-3)) for c in row] for row in cells])
+    ax.imshow(noise, cmap="PuOr_r", vmin=-2.0, vmax=2.0, aspect="auto", alpha=0.7)
+    for k, row in enumerate(cells):
+        for m, cell in enumerate(row):
+            ax.text(
+                m, k, cell["text"], ha="center", va="center", fontsize=8,
+                color=BEFORE if cell["fault"] else MEASURED, weight="bold" if cell["fault"] else "normal",
+            )  # fmt: skip
+    ax.set_xticks(range(len(columns)), columns)
+    ax.set_yticks(range(len(rows)), rows)
+    ax.xaxis.tick_top()
+    ax.tick_params(length=0)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+    ax.grid(visible=False)
+    return fig
