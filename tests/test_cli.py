@@ -3,13 +3,14 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from emafault.cli import main
 from emafault.faults import FAULT_NAMES
-from emafault.io.recording import read_recording
+from emafault.io.recording import read_recording, write_recording
 
 FAULT = (0.0375, 0.0504, 0.0507, 0.0059, -2.8e-5, -4.0)
 
@@ -45,6 +46,25 @@ def test_identify_untrained_prints_a_table_and_writes_intervals(folder, tmp_path
         half = 0.5 * (entry["high"] - entry["low"])
         assert entry["low"] < entry["value"] < entry["high"] and half < widest
         assert abs(entry["value"] - truth) < 3.0 * half
+
+
+MISTAKEN = {
+    "phases b and c swapped": lambda r: replace(r, phase_current=r.phase_current[:, [0, 2, 1]]),
+    "current's sign": lambda r: replace(r, phase_current=-r.phase_current, phase_current_end=-r.phase_current_end),
+    "angle 60 electrical degrees off": lambda r: replace(r, rotor_angle=r.rotor_angle + np.pi / 6.0),
+    "mV for V": lambda r: replace(r, phase_voltage=1e3 * r.phase_voltage),
+    "rpm for rad/s": lambda r: replace(r, rotor_speed=r.rotor_speed * 30.0 / np.pi),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKEN)
+def test_identify_refuses_a_miswired_recording_in_one_line(folder, tmp_path, capsys, mistake):
+    wrong = tmp_path / "wrong.nc"
+    write_recording(wrong, MISTAKEN[mistake](read_recording(folder / "faulty.nc")))
+    assert main(["identify", str(wrong), "--results", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("emafault identify: wrong.nc: ") and said.count("\n") == 1
+    assert main(["identify", str(folder / "faulty.nc"), "--reference", str(wrong), "--results", str(tmp_path)]) == 2
 
 
 def test_a_reference_takes_the_unit_s_tolerance_out(tmp_path):

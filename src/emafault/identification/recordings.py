@@ -8,9 +8,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.recording import Recording
+from ..io.sensors import refuse_mistaken
 from ..reconstruction import Features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
+
+#: what a fault vector's components can be of any machine, a unit off nominal allowed for
+POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,8 @@ def identify_recordings(
 
     Raises
     ------
-    InputError : naming the recording that cannot be used
+    InputError : naming the recording that cannot be used, for its signals contradict each other or what is identified
+        from it is impossible
     """
     identifier = model.identifier
     if not 0.0 < level < 1.0:
@@ -51,6 +56,8 @@ def identify_recordings(
     for recording in reference:
         if recording.health == "seeded":
             raise InputError(f"{recording.name}: has health 'seeded', a reference must be healthy")
+    for recording in (*recordings, *reference):
+        refuse_mistaken(recording.name, recording, identifier.actuator)
     features = [reconstruct_recordings([r], model.method, identifier.actuator, model.settings) for r in recordings]
     for recording, own in zip(recordings, features):
         if not np.all(own.identified):
@@ -65,13 +72,25 @@ def identify_recordings(
         found = calibrate(healthy, ambient, identifier.actuator, **options)
         unit, covariance = found.unit, found.covariance if np.all(np.isfinite(found.covariance)) else None
     estimates, notes = [], []
-    for own in features:
+    for recording, own in zip(recordings, features, strict=True):
         inputs = _inputs(own)
         noise = own.covariance if np.all(np.isfinite(own.covariance)) else None
         estimates += identifier.estimate(inputs, level, noise, unit, covariance)
+        _refuse_impossible(recording.name, estimates[-1])
         beyond = float(identifier.outside(inputs, unit)[0])
         notes.append(f"features lie {beyond:.0%} of their range outside what was learnt from" if beyond > 0.05 else "")
     return Identified(estimates, notes)
+
+
+def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -> None:
+    for component, found in estimate.items():
+        low, high = POSSIBLE[component if component == "dT" else "N" if component.startswith("N") else "xi"]
+        if not low <= found["value"] <= high:
+            units = " K" if component == "dT" else ""
+            raise InputError(
+                f"{name}: {component} would be {found['value']:.4g}{units}, possible is {low:g} to {high:g}{units}; "
+                "the recording's units, signs or phases are mistaken, or it is of another actuator"
+            )
 
 
 def _inputs(features: Features) -> np.ndarray:
