@@ -5,11 +5,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-_HERE = Path(__file__).resolve()
+from .paths import EFFECTS, PACKAGE
+
 _SOURCES = [
-    _HERE,
-    *sorted((_HERE.parent / "actuator").glob("*.py")),
-    *sorted((_HERE.parents[2] / "conf" / "effect").glob("*.yaml")),
+    Path(__file__).resolve(),
+    *sorted((PACKAGE / "actuator").glob("*.py")),
+    *sorted(EFFECTS.glob("*.yaml")),
 ]
 
 

@@ -19,9 +19,8 @@ from omegaconf import OmegaConf
 from . import checks, schema
 from .effects import EFFECTS
 from .errors import InputError
+from .paths import CONF
 
-ROOT = Path(__file__).resolve().parents[2]
-CONF = ROOT / "conf"
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
 RANK_BINS = 20  # of the ranks of the check of the evidence

@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from .errors import InputError
-
-PACKAGE = Path(__file__).resolve().parent
-EFFECTS = PACKAGE.parents[1] / "conf" / "effect"
+from .paths import EFFECTS, PACKAGE
 
 
 def check_writable(folder: str | Path) -> None:

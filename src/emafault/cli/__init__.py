@@ -23,6 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a subcommand; 0 if it did what was asked, 2 with one line on refused input."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     parser = argparse.ArgumentParser(prog="emafault", description=importlib.import_module("emafault").__doc__)
+    parser.add_argument(
+        "--version", action="version", version=f"emafault {importlib.import_module('emafault').__version__}"
+    )
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="{" + ",".join(COMMANDS) + "}")
     for name, text in COMMANDS.items():
         sub = subparsers.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
@@ -42,7 +45,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"emafault {args.command}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..identification.identifier import Identifier
 from ..identification.intervals import ConformalIntervals
 from ..identification.recordings import Model
+from ..paths import results_folder
 
 
 def load_model(experiment: str, choice: str | None = None, results: str | Path | None = None) -> Model:
@@ -30,7 +31,7 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
     InputError : an unknown experiment, or an estimator that was not trained
     """
     if results is None:
-        results = next((p for p in (Path("results"), configuration.ROOT / "results") if p.is_dir()), "results")
+        results = results_folder()
     folder = Path(results) / "experiments" / experiment
     trained = (folder / "configuration.yaml").is_file()
     config = _read_configuration(folder / "configuration.yaml") if trained else configuration.compose(experiment)

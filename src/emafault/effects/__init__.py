@@ -11,8 +11,9 @@ from pathlib import Path
 
 import yaml
 
+from ..paths import EFFECTS as FOLDER
+
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # every process reads the catalogue, and this is fast
-FOLDER = Path(__file__).resolve().parents[3] / "conf" / "effect"
 
 
 @dataclass(frozen=True)

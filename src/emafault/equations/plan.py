@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..io.atomic import write_text
 from ..io.bench import read_bench
 from ..io.split import split_bench
-from ..reporting.written import results_folder
+from ..paths import results_folder
 from .diagnose import diagnose
 from .page import finding, separated
 

@@ -9,8 +9,9 @@ from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
 from ..io.bench import Bench, read_bench
 from ..io.split import split_bench
+from ..paths import results_folder
 from ..reporting.retrained import section
-from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, file_name, results_folder
+from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, file_name
 from .corrected import new_folder, write_corrected
 from .diagnose import Diagnosed, diagnose
 from .handover import experiment_text

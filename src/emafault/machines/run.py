@@ -7,8 +7,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..io.atomic import write_text
+from ..paths import results_folder
 from ..reporting.page import Page
-from ..reporting.written import REPORT, VERDICT, checked, file_name, log_diagnosis, results_folder, to_json
+from ..reporting.written import REPORT, VERDICT, checked, file_name, log_diagnosis, to_json
 from .diagnose import Diagnosed, diagnose
 from .library import build, read_cases, stated
 from .page import draw, finding

@@ -12,17 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ..paths import results_folder
 from ..progress import say
 
 VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
 #: the format of every verdict, the reference actuator's and a measured machine's
 SCHEMA_FILE = Path(__file__).with_name("verdict.schema.json")
-
-
-def results_folder() -> Path:
-    """``results`` here, else the project's."""
-    here = Path("results")
-    return here if here.is_dir() else Path(__file__).resolve().parents[3] / "results"
 
 
 def to_json(value: Any) -> str:

@@ -1,0 +1,7 @@
+"""``python -m emafault``: the command."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())

@@ -1,0 +1,17 @@
+"""Where configuration and results are: of a clone beside the sources, of an installed package in it and in the working
+folder."""
+
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent
+_CLONE = PACKAGE.parents[1]
+_CLONED = (_CLONE / "conf" / "config.yaml").is_file()
+
+CONF = _CLONE / "conf" if _CLONED else PACKAGE / "conf"
+EFFECTS = CONF / "effect"
+
+
+def results_folder() -> Path:
+    """``results`` here, else that of the clone."""
+    here = Path("results")
+    return here if here.is_dir() or not _CLONED else _CLONE / "results"
