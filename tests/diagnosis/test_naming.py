@@ -106,6 +106,15 @@ def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch
     assert ratios == {"load_spring": 10.0} and kept[0].units == ("load_spring",)
 
 
+def test_a_name_that_neither_part_speaks_for_is_none(monkeypatch):
+    misfit = {("load_spring",): 99.0, (): 100.0}
+    whole, explored = [model(0.0, "load_spring"), model(-50.0)], [model(-8.0, "load_spring"), model(0.0)]
+    kept, ratios, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"])
+    assert ratios == {"load_spring": 0.5} and kept[0].units == ()
+    named = [m for m in kept if "load_spring" in m.units]
+    assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(7.5)
+
+
 def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypatch):
     misfit = {("load_spring",): 80.0, (): 100.0}
     whole, explored = [model(0.0, "load_spring"), model(-50.0)], [model(0.0, "load_spring"), model(-2.0)]

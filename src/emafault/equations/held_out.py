@@ -42,10 +42,11 @@ def held_to_account(
     overdispersion of its score, and what it loses goes to the same set without it: see ``dispersion``.
 
     The explored recordings are fitted with a named effect and without; both predict the confirm recordings, frozen. One
-    whose prediction is clearly the worse has the odds that the explored recordings gave it times the ratio of the
-    predictive densities (Bayes' rule one part of the data after the other), instead of those of all data together. What
-    it loses goes to the same set with a remainder in its place: no other effect has been shown by that. What is named
-    in consequence is held to account in turn. Where the explored recordings' set as a whole predicts worse than without
+    whose prediction is clearly the worse, or that by these odds is not there, has the odds that the explored recordings
+    gave it times the ratio of the predictive densities (Bayes' rule one part of the data after the other), instead of
+    those of all data together. What it loses goes to the same set without it, and where its prediction is the worse
+    with a remainder in its place: no other effect has been shown by that. What is named in consequence is held to
+    account in turn. Where the explored recordings' set as a whole predicts worse than without
     its effects, each is tried by itself.
 
     What has another size in each recording is held to account likewise: see ``constancy``.
@@ -69,11 +70,10 @@ def held_to_account(
             models[:] = [*(m for m in models if remainder not in m.units), *moved]
     for effect in _untold(models, ratios, lambda u: whole.search.units[u].kind in LISTED):
         ratios[effect] = account.ratio(effect)
-        if ratios[effect] < -CLEAR:
-            odds = _log_odds(fit.models, effect) + ratios[effect]
-            if odds < _log_odds(models, effect):
-                mass = _log_mass(models, effect)
-                models += _moved(whole, models, effect, True, float(mass - odds))
+        odds = _log_odds(fit.models, effect) + ratios[effect]
+        contradicted = ratios[effect] < -CLEAR
+        if (contradicted or odds < 0.0) and odds < _log_odds(models, effect):
+            models += _moved(whole, models, effect, contradicted, float(_log_mass(models, effect) - odds))
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
         models += _dispersed(every, whole, models, leading, effect)
         changes[effect] = log_odds_of_change(every, whole, leading, effect)
