@@ -1,5 +1,6 @@
 """Groups, the hole in a calibration effect's prior, and names that the held-out recordings contradict."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,7 +79,9 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
     everything = SimpleNamespace(
         models=whole,
         search=SimpleNamespace(
-            fit=lambda members: model(-50.0, *(u for u, _ in members)), log_prior=lambda members: -2.0 * len(members),
+            fit=lambda members: model(-50.0, *(u for u, _ in members)),
+            less=lambda m, out: model(-10.0, *(u for u in m.units if u != out)),
+            log_prior=lambda members: -2.0 * len(members),
             candidates={("remainder:torque", 0): None}, units=units,
         ),
     )  # fmt: skip
@@ -126,7 +129,8 @@ def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypat
 
 def test_a_name_whose_score_is_overdispersed_is_told_by_less(monkeypatch):
     misfit = {("load_spring",): 80.0, (): 100.0}
-    whole, explored = [model(0.0, "load_spring"), model(-10.0)], [model(0.0, "load_spring"), model(-2.0)]
+    whole = [replace(model(0.0, "load_spring"), log_likelihood=2.0), model(-10.0)]
+    explored = [model(0.0, "load_spring"), model(-2.0)]
     kept, _, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"], dispersion=4.0)
     odds = np.logaddexp.reduce([m.log_posterior for m in kept if "load_spring" in m.units])
     odds -= np.logaddexp.reduce([m.log_posterior for m in kept if not m.units])

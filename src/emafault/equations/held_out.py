@@ -1,6 +1,6 @@
 """Whether what was named holds on the recordings that took no part in naming it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
-from ..diagnosis.naming import NAMED, PRESENT
+from ..diagnosis.naming import NAMED, PRESENT, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Model, inclusion
 
@@ -46,8 +46,8 @@ def held_to_account(
     gave it times the ratio of the predictive densities (Bayes' rule one part of the data after the other), instead of
     those of all data together. What it loses goes to the same set without it, and where its prediction is the worse
     with a remainder in its place: no other effect has been shown by that. What is named in consequence is held to
-    account in turn. Where the explored recordings' set as a whole predicts worse than without
-    its effects, each is tried by itself.
+    account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
+    whole predicts worse than without its effects, each is tried by itself.
 
     What has another size in each recording is held to account likewise: see ``constancy``.
 
@@ -66,28 +66,41 @@ def held_to_account(
     for remainder in _untold(models, ratios, lambda u: whole.search.units[u].kind == "remainder", PRESENT):
         ratios[remainder] = account.of_remainder(remainder)
         if ratios[remainder] < CLEAR:
-            moved = _moved(whole, models, remainder, False, _log_mass(models, remainder))
+            moved = _moved(whole, models, remainder, False, _log_mass(models, (remainder,)))
             models[:] = [*(m for m in models if remainder not in m.units), *moved]
-    for effect in _untold(models, ratios, lambda u: whole.search.units[u].kind in LISTED):
-        ratios[effect] = account.ratio(effect)
-        odds = _log_odds(fit.models, effect) + ratios[effect]
-        contradicted = ratios[effect] < -CLEAR
-        if (contradicted or odds < 0.0) and odds < _log_odds(models, effect):
-            models += _moved(whole, models, effect, contradicted, float(_log_mass(models, effect) - odds))
+    for told in _told(whole, models, ratios):
+        effect = max(told, key=lambda u: _log_mass(models, (u,)))  # of a group the likeliest stands for all
+        ratio = account.ratio(effect)
+        ratios |= dict.fromkeys(told, ratio)
+        odds = _log_odds(fit.models, told) + ratio
+        if (ratio < -CLEAR or odds < 0.0) and odds < _log_odds(models, told):
+            mass = _log_mass(models, told) - odds
+            models += _moved(whole, models, effect, ratio < -CLEAR, mass)
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
-        models += _dispersed(every, whole, models, leading, effect)
-        changes[effect] = log_odds_of_change(every, whole, leading, effect)
-        models += _moved(whole, models, effect, True, _log_mass(models, effect) + changes[effect])
+        models += _dispersed(every, whole, models, leading, effect, told)
+        change = log_odds_of_change(every, whole, leading, effect)
+        changes |= dict.fromkeys(told, change)
+        models += _moved(whole, models, effect, True, _log_mass(models, told) + change)
     scanned = {d.id for d in explored.described}
     for form in _untold(models, ratios, scanned.__contains__):
         ratios[form] = account.ratio(form)
         leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
-        models += _dispersed(every, whole, models, leading, form)
+        models += _dispersed(every, whole, models, leading, form, (form,))
         if ratios[form] < CLEAR:
             left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
-            moved = _moved(whole, models, form, left, _log_mass(models, form))
+            moved = _moved(whole, models, form, left, _log_mass(models, (form,)))
             models[:] = [*(m for m in models if form not in m.units), *moved]
     return sorted(models, key=lambda m: -m.log_posterior), ratios, changes
+
+
+def _told(whole: Fit, models: list[Model], ratios: Mapping[str, float]) -> Iterator[tuple[str, ...]]:
+    """Listed effects that the sets, as they are by then, would name, and groups, not yet held to account."""
+    while True:
+        found = read(models, whole.search.units.values())
+        left = [t for t in (*((e,) for e in found.named), *found.groups) if not set(t) <= set(ratios)]
+        if not left:
+            return
+        yield left[0]
 
 
 def _untold(
@@ -139,8 +152,9 @@ class _Account:
         return self.misfits[model.choices]
 
 
-def _log_mass(models: Sequence[Model], unit: str) -> float:
-    return float(logsumexp([m.log_posterior for m in models if unit in m.units]))
+def _log_mass(models: Sequence[Model], units: Collection[str]) -> float:
+    """Log mass of the sets that hold one of some units."""
+    return float(logsumexp([m.log_posterior for m in models if not set(units).isdisjoint(m.units)]))
 
 
 def _moved(whole: Fit, models: Sequence[Model], unit: str, left: bool, mass: float) -> list[Model]:
@@ -153,15 +167,23 @@ def _moved(whole: Fit, models: Sequence[Model], unit: str, left: bool, mass: flo
     return [replace(_less(whole, m, unit, left), log_posterior=float(m.log_posterior - all_of + mass)) for m in likely]
 
 
-def _dispersed(every: Bench, whole: Fit, models: Sequence[Model], leading: Model, unit: str) -> list[Model]:
-    """The likely sets with a unit, each less that one, with what it loses where its score is overdispersed."""
-    members = [(c.unit, c.variant) for c in leading.choices]
-    prior = whole.search.log_prior(members) - whole.search.log_prior([m for m in members if m[0] != unit])
-    gain = _log_odds(models, unit) - prior
-    dispersion = overdispersion(every, whole, leading, unit) if 0.0 < gain < np.inf else 1.0
+def _dispersed(
+    every: Bench, whole: Fit, models: Sequence[Model], leading: Model, unit: str, told: Collection[str]
+) -> list[Model]:
+    """The likely sets with a unit, each less that one, with what is ``told`` loses where its score is overdispersed.
+
+    Of a unit by itself that is of its odds against all other sets; of a group, whose members stand in for each other,
+    of its likelihood ratio against nothing in its place.
+    """
+    dispersion = overdispersion(every, whole, leading, unit)
     if dispersion == 1.0:
         return []
-    return _moved(whole, models, unit, False, _log_mass(models, unit) - (prior + gain / dispersion))
+    gain = leading.log_likelihood - whole.search.less(leading, unit).log_likelihood
+    members = [(c.unit, c.variant) for c in leading.choices]
+    prior = whole.search.log_prior(members) - whole.search.log_prior([m for m in members if m[0] != unit])
+    if len(told) == 1:
+        gain = min(gain, _log_odds(models, told) - prior)
+    return _moved(whole, models, unit, False, _log_mass(models, told) - (prior + max(gain, 0.0) / dispersion))
 
 
 def _less(whole: Fit, model: Model, unit: str, left: bool) -> Model:
@@ -232,10 +254,10 @@ def _occam(ladder: Ladder, whites: Sequence[White], model: Model, fit: Fit) -> f
     return found
 
 
-def _log_odds(models: Sequence[Model], effect: str) -> float:
-    """Log odds of an effect over the sets seen."""
-    inside = [m.log_posterior for m in models if effect in m.units]
-    outside = [m.log_posterior for m in models if effect not in m.units]
+def _log_odds(models: Sequence[Model], units: Collection[str]) -> float:
+    """Log odds, over the sets seen, that one of some units is there."""
+    inside = [m.log_posterior for m in models if not set(units).isdisjoint(m.units)]
+    outside = [m.log_posterior for m in models if set(units).isdisjoint(m.units)]
     if not inside or not outside:
         return np.inf if inside else -np.inf
     return float(logsumexp(inside) - logsumexp(outside))
