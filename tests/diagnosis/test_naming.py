@@ -73,7 +73,8 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
 def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0, dispersion=1.0):
     """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
     units = {
-        "load_spring": unit("load_spring", "torque"), "~order": unit("~order", "torque", kind="form"),
+        "load_spring": unit("load_spring", "torque"), "load": unit("load", "torque"),
+        "~order": unit("~order", "torque", kind="form"),
         "remainder:torque": unit("remainder:torque", "torque", kind="remainder"),
     }  # fmt: skip
     everything = SimpleNamespace(
@@ -116,6 +117,23 @@ def test_a_name_that_neither_part_speaks_for_is_none(monkeypatch):
     assert ratios == {"load_spring": 0.5} and kept[0].units == ()
     named = [m for m in kept if "load_spring" in m.units]
     assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(7.5)
+
+
+def test_a_name_that_the_explored_recordings_cannot_have_keeps_its_odds(monkeypatch):
+    whole = [model(0.0, "load_spring"), model(-50.0)]
+    kept, ratios, _ = held(monkeypatch, {(): 100.0}, whole, [model(0.0)], [])
+    assert ratios == {"load_spring": 0.0} and kept[0].units == ("load_spring",)
+    assert all(np.isfinite(m.log_posterior) for m in kept)
+
+
+def test_members_of_a_group_are_held_to_account_together(monkeypatch):
+    misfit = {("load_spring",): 80.0, (): 100.0}
+    whole = [model(0.0, "load_spring"), model(-0.2, "load"), model(-50.0)]
+    explored = [model(0.0, "load_spring"), model(-0.2, "load"), model(-9.0)]
+    kept, ratios, changes = held(monkeypatch, misfit, whole, explored, [])
+    assert set(ratios) == set(changes) == {"load_spring", "load"} and kept[0].units == ("load_spring",)
+    kept, _, _ = held(monkeypatch, misfit, whole, explored, [], change=4.0)
+    assert kept[0].units == ("remainder:torque",)
 
 
 def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypatch):

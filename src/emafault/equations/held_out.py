@@ -73,9 +73,9 @@ def held_to_account(
         ratio = account.ratio(effect)
         ratios |= dict.fromkeys(told, ratio)
         odds = _log_odds(fit.models, told) + ratio
-        if (ratio < -CLEAR or odds < 0.0) and odds < _log_odds(models, told):
-            mass = _log_mass(models, told) - odds
-            models += _moved(whole, models, effect, ratio < -CLEAR, mass)
+        # of what the explored recordings have no columns they say nothing
+        if np.isfinite(odds) and (ratio < -CLEAR or odds < 0.0) and odds < _log_odds(models, told):
+            models += _moved(whole, models, effect, ratio < -CLEAR, _log_mass(models, told) - odds)
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
         models += _dispersed(every, whole, models, leading, effect, told)
         change = log_odds_of_change(every, whole, leading, effect)
