@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import Definite, Reduced
 from .fit import Bench, Inserted
-from .linear import White, assemble, compressed, white_rows
+from .linear import White, assemble, compressed, disturbance, white_rows
 from .model import SETTINGS, Block
 from .point import is_parameter
 
@@ -33,11 +33,13 @@ class Ladder:
         remainders: bool = False,
         also: Collection[str] = (),
         inserted: Inserted | None = None,
+        corrected: bool = False,
     ) -> list[White]:
         """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked.
 
         ``also`` names parameters of the model, of which those of a recording are refitted too; ``inserted`` takes the
-        remainders and own forms of a fitted set out of what is left.
+        remainders and own forms of a fitted set out of what is left. ``corrected`` gives each block the noise's part of
+        its misfit.
         """
         out: list[White] = []
         of_each = {n.rsplit("@", 1)[0] for n in also if "@" in n}
@@ -52,10 +54,15 @@ class Ladder:
             mine, weights = {n: p.off for n, p in self.parameters.items()} | dict(values), self.carried[recording]
             for step in range(STEPS + 1):
                 last = step == STEPS
+                blocks = self.machine.blocks(mine, recording, wanted=[*free, *shaped])
                 whites = [
                     compressed(b, *self._rows(b, free, remainders and last, inserted), weights.get(b.equation))
-                    for b in self.machine.blocks(mine, recording, wanted=[*free, *shaped])
+                    for b in blocks
                 ]
+                if last and corrected:
+                    others = self.machine.blocks(mine, recording, disturbed=True, wanted=[])
+                    for white, block, other in zip(whites, blocks, others, strict=True):
+                        white.own = float(disturbance(block, other, [], weights.get(block.equation))[0, 0])
                 if last:
                     out += whites
                     break

@@ -52,7 +52,7 @@ def held_to_account(
     What has another size in each recording is held to account likewise: see ``constancy``.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
-    it; so is a remainder, which takes up whatever the model has of the noise wrong.
+    it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong.
 
     Returns
     -------
@@ -81,8 +81,8 @@ def held_to_account(
         change = log_odds_of_change(every, whole, leading, effect)
         changes |= dict.fromkeys(told, change)
         models += _moved(whole, models, effect, True, _log_mass(models, told) + change)
-    scanned = {d.id for d in explored.described}
-    for form in _untold(models, ratios, scanned.__contains__):
+
+    for form in _untold(models, ratios, lambda u: whole.search.units[u].kind == "form"):
         ratios[form] = account.ratio(form)
         leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
         models += _dispersed(every, whole, models, leading, form, (form,))
@@ -200,13 +200,16 @@ def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
     """-2 log predictive density of the confirm recordings under a set fitted to the explored ones, up to a constant.
 
     Remainders are integrated: what all recordings share over the posterior of the explored ones, what each has of its
-    own over its prior.
+    own over its prior. The noise's part of the misfit, which goes with the coefficients that noise is multiplied by, is
+    taken out.
     """
     inserted = bench.inserted(model, fit.normal)
     also = [n for n in model.deviations if is_parameter(n)]
     shared, own = _remainders(fit, model)
-    whites = ladder.blocks(inserted.values, remainders=bool(shared or own), also=also, inserted=inserted)
-    found = _occam(ladder, whites, model, fit) + sum(float(w.gram[-1, -1]) for w in whites)
+    whites = ladder.blocks(
+        inserted.values, remainders=bool(shared or own), also=also, inserted=inserted, corrected=True
+    )
+    found = _occam(ladder, whites, model, fit) + sum(float(w.gram[-1, -1]) - w.own for w in whites)
     if not shared and not own:
         return found
     seen = dict.fromkeys(n for w in whites for n in w.names if n.startswith("remainder."))
