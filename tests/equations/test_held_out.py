@@ -1,0 +1,40 @@
+"""What a misfit on recordings set aside is compared with."""
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.closure import Ladder
+from emafault.diagnosis.fit import NOTHING, Bench
+
+from .conftest import machine_of, recorded
+
+
+@pytest.fixture(scope="module")
+def ladder():
+    """A recording of the nominal unit, at rest in its prior, and the whole point there."""
+    machine = machine_of({f"r{n}.nc": recorded("sine", {}, (0.0,) * 5 + (20.0,), seed=n, theta_0=n) for n in range(2)})
+    bench = Bench(machine, list(machine.recordings))
+    bench.settle(NOTHING)
+    bench.linearise(renew=True)
+    return Ladder(bench, list(machine.recordings)), bench.values()
+
+
+def electrical(ladder, values, **options):
+    whites = [w for w in ladder.blocks(values, **options) if w.equation.startswith("electrical")]
+    return sum(w.gram[-1, -1] for w in whites), sum(w.own for w in whites), sum(w.count for w in whites)
+
+
+def test_noise_alone_is_the_noise_s_part(ladder):
+    misfit, own, rows = electrical(*ladder, corrected=True)
+    assert misfit - own == pytest.approx(0.0, abs=4.0 * np.sqrt(4.0 * rows))
+    assert electrical(*ladder)[1] == 0.0
+
+
+def test_a_coefficient_that_multiplies_noise_loses_nothing_by_that(ladder):
+    """A larger inductance multiplies the end currents' noise by more: that much of its misfit says nothing of it."""
+    fixed, values = ladder
+    larger = values | {"inductance_tolerance.L_scale": 1.05 * values["inductance_tolerance.L_scale"]}
+    raw, part, _ = electrical(fixed, larger, corrected=True)
+    before, own, rows = electrical(fixed, values, corrected=True)
+    assert part - own > 4.0 * np.sqrt(0.05 * rows)
+    assert before - own < raw - part < raw - own
