@@ -11,7 +11,7 @@ from .conftest import machine_of, recorded
 
 @pytest.fixture(scope="module")
 def ladder():
-    """A recording of the nominal unit, at rest in its prior, and the whole point there."""
+    """Two recordings of the nominal unit as those that confirm, and the values of their own fit."""
     machine = machine_of({f"r{n}.nc": recorded("sine", {}, (0.0,) * 5 + (20.0,), seed=n, theta_0=n) for n in range(2)})
     bench = Bench(machine, list(machine.recordings))
     bench.settle(NOTHING)

@@ -51,8 +51,7 @@ def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[t
     aliases = bench.columns()[1]
     of_unit = next(c for c in model.choices if c.unit == unit)
     added = {n: model.deviations[n] - bench.prior(n)[2] for n in bench.names_of(of_unit)}
-    at_fit = bench.nuisance_deviations(fit.normal, model.deviations) | dict(model.deviations)
-    residual = _by_column(at_fit, aliases)
+    residual = bench.own_deviations(model, fit.normal)
     score = _by_column(_taken_out(bench, fit, model, unit, added) | added, aliases)
     wanted = [n for n in dict.fromkeys([*residual, *score]) if is_parameter(n)]
     acting = [aliases.get(n, n) for n in added]

@@ -50,10 +50,10 @@ class NormalEquations(Point):
         if leading is None:
             full = full_model(whites, self._full_prior(*self._columns_of(model)))
         else:
-            full = self._own_deviations(leading, self.normal(whites, model))
+            full = self.own_deviations(leading, self.normal(whites, model))
         return self._each(replace(task, full=full, leads=leading is not None), self.recordings)
 
-    def _own_deviations(self, model: Model, normal: Normal) -> dict[str, float]:
+    def own_deviations(self, model: Model, normal: Normal) -> dict[str, float]:
         """Deviations of columns from the present point in a model, the nuisances fitted beside it."""
         out = self.nuisance_deviations(normal, model.deviations)
         for n, d in model.deviations.items():

@@ -8,17 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..actuator.commands import command_positions
-from ..actuator.parameters import ActuatorParameters
-from ..actuator.sensors import SensorNoise
 from ..errors import InputError
 from ..io.atomic import write_text
-from ..io.bench import read_bench
-from ..io.split import split_bench
 from ..paths import results_folder
-from .diagnose import diagnose
-from .page import finding, separated
+from .page import separated
+from .run import diagnosed
 
-PROCESSES = 2
 PLAYED = 1e-3  # s between two positions of a motion
 
 
@@ -56,11 +51,7 @@ def plan(path: str | Path, spec: Mapping[str, Any], out: str | Path | None = Non
 
 
 def _diagnosed(path: str | Path, spec: Mapping[str, Any]) -> dict[str, Any]:
-    actuator = ActuatorParameters(**spec["actuator"])
-    bench = read_bench(path, actuator)
-    split = split_bench(bench.recordings)
-    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), (), PROCESSES)
-    print("\n".join(finding(found.verdict)), flush=True)
+    _, found = diagnosed(path, spec)
     return found.verdict | {"next_experiment": found.next_experiments()}
 
 

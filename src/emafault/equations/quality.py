@@ -96,7 +96,7 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
 
 
 def at_a_glance(quality: Mapping[str, Mapping[str, Channel]]) -> dict[str, dict[str, dict[str, float]]]:
-    """The same as the verdict file has it: recording -> channel -> what is not zero of it, with its unit."""
+    """The same as the verdict file has it: recording -> channel -> its noise, and what else is not zero."""
     return {
         name: {
             channel: {k: v for k, v in asdict(found).items() if v or k == "noise"}

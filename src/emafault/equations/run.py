@@ -46,14 +46,9 @@ def diagnose_folder(
     """
     if corrected is not None:  # refused before the work, not after it
         new_folder(path, corrected)
-    actuator = ActuatorParameters(**spec["actuator"])
-    bench = read_bench(path, actuator)
+    bench, found = diagnosed(path, spec, exclude)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
-    split = split_bench(bench.recordings)
-    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
     verdict = found.verdict
-    verdict["warnings"] = bench.warnings
-    print("\n".join(finding(verdict)), flush=True)
     with aside(track) as tracked:
         _write(found, bench, folder, experiment)
         if corrected is not None:
@@ -62,6 +57,22 @@ def diagnose_folder(
         print(f"written to {folder}", flush=True)
         tracked(spec["tracking"], folder, verdict)
     return verdict
+
+
+def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> tuple[Bench, Diagnosed]:
+    """A folder of recordings read and diagnosed, what was found printed.
+
+    Raises
+    ------
+    InputError : recordings or effects that cannot be used
+    """
+    actuator = ActuatorParameters(**spec["actuator"])
+    bench = read_bench(path, actuator)
+    split = split_bench(bench.recordings)
+    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
+    found.verdict["warnings"] = bench.warnings
+    print("\n".join(finding(found.verdict)), flush=True)
+    return bench, found
 
 
 def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None) -> None:
