@@ -52,7 +52,9 @@ class Machine:
             b.residual = b.residual - part
         self.carried = {n: {"torque": Weights(np.ones(SIZE, bool), np.zeros(0), np.ones(SIZE))} for n in NAMES}
 
-    def channels(self, equation):
+    moving = ()
+
+    def channels(self, equation, driver):
         return ()
 
     def coefficients(self, equation, driver):
@@ -75,6 +77,7 @@ CASES = [
     ("function", {"coordinate": 0.0, "from": -150.0, "to": 150.0}, (0.3, -0.2, 0.1, 0.2, -0.2), 0),
     ("power", {"exponent": 2.0}, (0.4,), 1),
     ("memory", {"source": 0.0, "time_constant": 0.12}, (0.05,), 1),
+    ("memory", {"source": 2.0, "time_constant": 0.1}, (0.6,), 0),
 ]
 
 

@@ -16,11 +16,12 @@ from .evidence import log_evidence
 from .fit import Bench, Fit
 from .linear import White, assemble
 from .model import WORDS
-from .search import FORM_PRIOR, OTHER_FORM, SIZE_PRIOR, Model
+from .search import FORM_PRIOR, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
 
 SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
 #: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes
 SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
+SHARES = (10.0, 3.0, 1.0, 0.3)  # of a unit's size, of what goes along its columns without being of its form
 #: log odds before the data that what is seen is no listed effect, but a coefficient that changes
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)) - np.log(SIZE_PRIOR[1] / SIZE_PRIOR[0]))
 
@@ -60,6 +61,41 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
     constant = [evidence(one), evidence(nearly)]
     return float(log_mean(changing) - log_mean(constant) + PRIOR)
+
+
+def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
+    """Log posterior odds that what a unit of a set takes up goes along it with any coefficients, against the unit.
+
+    The unit's columns times functions of what their rows lie along have coefficients of zero mean and any size there,
+    in the place of the unit in its own form or one near it: what is left over of another cause has them.
+
+    Minus infinity for a unit that carries no form of its own.
+    """
+    choice = next(c for c in model.choices if c.unit == unit)
+    plain = fit.search.candidates[unit, choice.variant % OTHER_FORM]
+    forms = [
+        fit.search.candidates[unit, v] for u, v in fit.search.candidates
+        if u == unit and v >= OTHER_FORM and v % OTHER_FORM == choice.variant % OTHER_FORM
+    ]  # fmt: skip
+    if not forms:
+        return -np.inf
+    prior = prior_of(fit, model)
+    rest = {n: q for n, q in prior.items() if n not in plain.names and not n.startswith(f"own.{unit}.")}
+    names: Sequence[str] = fit.search.reduced.names
+
+    def evidence(free: dict[str, tuple[float, float]]) -> float:
+        index = np.array([fit.search.reduced.index[n] for n in free], int)
+        mean, sd = np.array([*free.values()]).reshape(-1, 2).T
+        return log_evidence(fit.search.reduced, index, mean, sd)[0]
+
+    whole = rest | {n: prior[n] for n in plain.names}
+    near = [
+        evidence(whole | {names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)}) for f in forms
+    ]
+    of = logsumexp([evidence(whole) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)])
+    kinds = {tuple(f.extra.tolist()) for f in forms}
+    any_of = [evidence(rest | {names[k]: (0.0, s) for k in kind}) for kind in kinds for s in SHARES]
+    return float(log_mean(any_of) - of + PRIOR)
 
 
 def log_mean(logs: Sequence[float]) -> float:

@@ -95,6 +95,9 @@ class WithForms:
                 if not here.any() and wanted is not None and not set(names) & set(wanted):
                     continue
                 columns = self.columns(form, block)
+                if columns is None and (form.channel, block.equation) in self.machine.moving:
+                    x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
+                    columns = self.machine.seen_at(values, block.recording, x)
                 if columns is None or not columns.any():
                     continue
                 block.residual = block.residual + here @ columns
@@ -180,10 +183,10 @@ def proposed(machine, found: Sequence[Proposal]) -> list[Described]:
 def _elsewhere(machine, form: Described) -> list[Described]:
     """The same shape where it acts in several equations: a channel of the measuring chain, or a coefficient that they
     share."""
-    if form.driver == 0:
-        names = [c for c in machine.channels(form.equation) if c.split("_")[0] in FORMS[form.word].CHANNELS]
-    else:
-        names = machine.coefficients(form.equation, form.driver) if not FORMS[form.word].EACH else []
+    module = FORMS[form.word]
+    names = [c for c in machine.channels(form.equation, form.driver) if c.split("_")[0] in module.CHANNELS]
+    if form.driver > 0 and not module.EACH:
+        names += machine.coefficients(form.equation, form.driver)
     out = []
     for place in names:
         equation, scale = machine.place(place, form.equation)

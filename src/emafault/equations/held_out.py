@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ..diagnosis.closure import Ladder
-from ..diagnosis.constancy import log_odds_of_change
+from ..diagnosis.constancy import log_odds_of_another_cause, log_odds_of_change
 from ..diagnosis.dispersion import overdispersion
 from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
@@ -80,7 +80,8 @@ def held_to_account(
         models += _dispersed(every, whole, models, leading, effect, told)
         change = log_odds_of_change(every, whole, leading, effect)
         changes |= dict.fromkeys(told, change)
-        models += _moved(whole, models, effect, True, _log_mass(models, told) + change)
+        other = np.logaddexp(change, log_odds_of_another_cause(whole, leading, effect))
+        models += _moved(whole, models, effect, True, _log_mass(models, told) + other)
 
     for form in _untold(models, ratios, lambda u: whole.search.units[u].kind == "form"):
         ratios[form] = account.ratio(form)

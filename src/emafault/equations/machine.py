@@ -58,6 +58,7 @@ class ReferenceActuator:
     """Recordings of one unit of the reference actuator as the diagnosis sees them."""
 
     name = "actuator"
+    moving = (("angle", "commutation"),)  # channel and equation, what shows of one in the other depends on the point
 
     def __init__(self, actuator: ActuatorParameters, recordings: Mapping[str, Signals], exclude: Sequence[str] = ()):
         self.actuator = actuator
@@ -233,9 +234,10 @@ class ReferenceActuator:
         return self._recording(values, rec, wanted)
 
     # ---- the measuring chain
-    def channels(self, equation: str) -> tuple[str, ...]:
-        """Channels in which a form that shows in an equation may lie, rather than in the equation itself."""
-        return CHANNELS.get(equation, ())
+    def channels(self, equation: str, driver: int) -> tuple[str, ...]:
+        """Channels in which a form of a driver of an equation may lie, rather than in the equation itself: a wave of
+        the recorded angle is also one of its rate, times the speed."""
+        return CHANNELS.get(equation, ()) if driver == 0 or (equation, driver) == ("sensor_speed", 1) else ()
 
     def coefficients(self, equation: str, driver: int) -> tuple[str, ...]:
         """Coefficients of other equations as well that a driver of an equation has."""
@@ -263,7 +265,17 @@ class ReferenceActuator:
         for row in x:
             for b, at in zip(before, self._recording(off, rec.less(place, step * row), ()), strict=True):
                 found[b.equation].append((at.residual - b.residual) / step)
-        return {e: np.array(rows) for e, rows in found.items()}
+        return {e: np.array(rows) for e, rows in found.items() if (place, e) not in self.moving}
+
+    def seen_at(self, values: Mapping[str, float], name: str, x: np.ndarray) -> np.ndarray:
+        """(column, row) the same of signals on the angle's channel in the commutations, which depends on the point: on
+        where within an interval an edge lies."""
+        edges = [f"controller.edge_{j}@{name}" for j in PER_PHASE]
+        state = State(self.recordings[name], Point(values, name, edges))
+        slopes = commutation.residual(state).slopes
+        rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
+        moved = sum((np.asarray(slopes[e]) for e in edges if e in slopes), np.zeros(len(rows)))
+        return -self.actuator.pole_pairs * x[:, rows] * moved
 
     def _back_emf(self, state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
         """The same of a relative change of phase j's back-EMF coefficient: in its voltage and in the torque."""

@@ -112,8 +112,9 @@ def _noise(x: np.ndarray) -> float:
 
 
 def _repeated(x: np.ndarray) -> float:
-    """Share of the samples equal to the one before, where the channel moves otherwise."""
-    same = np.diff(x) == 0.0
+    """Share of the samples equal to the one before, where the channel moves otherwise; what stays at an end of its
+    range is cut off there and not held."""
+    same = (np.diff(x) == 0.0) & (x[1:] > x.min()) & (x[1:] < x.max())
     return float(same.mean()) if HELD <= same.sum() < 0.5 * len(same) else 0.0
 
 

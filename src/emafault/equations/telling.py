@@ -14,7 +14,7 @@ from .machine import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
-WORDS = {"loss": "copper loss", "speed": "speed"}
+WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
 
 def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, float]:
@@ -30,7 +30,11 @@ def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, fl
     if form.equation.startswith("electrical"):
         phase = form.equation[-1]
         return (
-            (f"a voltage of phase {phase}", "V", 1.0),
+            (
+                f"the recorded voltage of phase {phase}" if _of_a_clock(form) else f"a voltage of phase {phase}",
+                "V",
+                1.0,
+            ),
             (f"the resistance of phase {phase}", "ohm", 1.0),
             (f"the back-EMF coefficient of phase {phase}", "V s/rad", SWEPT),
         )[form.driver]
@@ -66,7 +70,9 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
     }
     values = factor * np.array([v for v, _ in linear.values()])
     spread = abs(factor) * float(np.sqrt(np.mean([sd**2 for _, sd in linear.values()])))
+    warms_up = _warms_up(form)
     for name, value in module.told(values).items():
+        name = "offset" if warms_up else name
         angle = name == "phase"
         width = Z * (spread / max(float(np.hypot(*values[:2])), 1e-12) if angle else spread)
         parameters[name] = {
@@ -75,10 +81,7 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
             "high": value + width,
             "units": "rad" if angle else units,
         }
-    where = EQUATION.get(form.equation, form.equation)
-    along = module.ALONG
-    if form.word == "function":
-        along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
+    where, along = place(form), _along(form)
     return {
         "equation": where, "along": along,
         "form": _word(form), "parameters": parameters,
@@ -115,8 +118,34 @@ def told_of_chain(
     }  # fmt: skip
 
 
+def place(form: Described) -> str:
+    """Equation that the verdict tells a form in: no winding has a clock, a voltage along time is its channel's."""
+    if form.equation.startswith("electrical") and _of_a_clock(form):
+        return "sensor_voltage"
+    return EQUATION.get(form.equation, form.equation)
+
+
+def _along(form: Described) -> str:
+    if form.word == "function":
+        return tuple(function.COORDINATES)[int(form.values["coordinate"])]
+    return str(FORMS[form.word].ALONG)
+
+
+def _of_a_clock(form: Described) -> bool:
+    """Whether it adds something that goes with time alone."""
+    source = memory.SOURCES[int(form.values["source"])] if form.word == "memory" else "start"
+    return form.driver == 0 and not form.channel and _along(form) == "time" and source == "start"
+
+
+def _warms_up(form: Described) -> bool:
+    """Whether it is a channel that settles once it is switched on."""
+    return form.word == "memory" and _of_a_clock(form) and form.equation != "torque"
+
+
 def _word(form: Described) -> str:
     """A form's word in the verdict."""
+    if _warms_up(form):
+        return "drift"
     if form.word == "function" and form.driver:
         return "coefficient"
     return "function" if form.word == "power" else form.word
@@ -161,8 +190,9 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
             f"{what} goes with the speed to the power of {found['exponent'][0]:.3g}, {of('at_100_rad_s')} at 100 rad/s"
         )
     elif form.word == "memory":
-        source = WORDS[memory.SOURCES[int(form.values["source"])]]
-        says = f"{what} builds up with the {source}, with a time constant of {of('time_constant')}"
+        source = memory.SOURCES[int(form.values["source"])]
+        by = f"drifts by {of('offset')} from the start" if "offset" in found else f"builds up with the {WORDS[source]}"
+        says = f"{what} {by}, with a time constant of {of('time_constant')}"
     else:
         knots = [found[n] for n in function.VALUES]
         low, high = min(v for v, _ in knots), max(v for v, _ in knots)

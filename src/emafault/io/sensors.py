@@ -17,7 +17,7 @@ START_POSITION = 3e-3  # rad at the user shaft, from zero
 MOVING = 2.0  # rad/s
 CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme value
 CLIPPED_LEAST = 20
-CLIPPED_FINE = 8  # samples in a channel whose values otherwise never repeat
+CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise never repeat
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
 SPIKE = 10.0  # robust standard deviations of a second difference
 FEWEST_SPIKES = 3  # in a recording
@@ -216,7 +216,8 @@ def cut_off(recording: Recording) -> dict[str, np.ndarray]:
         for j in range(3) if values is not None else ():
             for extreme in (np.max, np.min):
                 level, count, beside = _at_extreme(values[moving, j], extreme)
-                if abs(level) > 1e-9 and count > 5 * beside and count >= (least if beside > 1.5 else CLIPPED_FINE):
+                enough = count >= CLIPPED_FINE if beside < 1.5 else count >= max(least, 5 * beside)
+                if abs(level) > 1e-9 and enough:
                     cut[:, j] |= values[:, j] == level
         if cut.any():
             out[variable] = cut

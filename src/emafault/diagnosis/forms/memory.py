@@ -1,4 +1,5 @@
-"""What builds up with a time constant and is driven by loss or by speed, from nothing at each recording's start."""
+"""What builds up with a time constant, from nothing at each recording's start: driven by loss or by speed, or as
+what warms up once it is switched on."""
 
 from collections.abc import Mapping
 
@@ -13,7 +14,7 @@ ALONG = "time"
 EACH = False
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("gain",)
-SOURCES = ("loss", "speed")  # current squared (A2), magnitude of the speed (100 rad/s)
+SOURCES = ("loss", "speed", "start")  # current squared (A2), magnitude of the speed (100 rad/s), one
 CONSTANTS = np.geomspace(0.05, 1.0, 6)  # of the longest recording
 FINER = np.geomspace(0.6, 1.0 / 0.6, 7)
 
@@ -26,6 +27,8 @@ def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
 def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
     if SOURCES[source] == "loss":
         x = (0.5 * np.asarray(coordinates["current"])) ** 2
+    elif SOURCES[source] == "start":
+        return 1.0 - np.exp(-np.asarray(coordinates["time"]) / constant)
     else:
         x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
     steps = np.diff(coordinates["time"])

@@ -1,0 +1,56 @@
+"""Described forms in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emafault.diagnosis.described import Described
+from emafault.equations import telling
+
+from .conftest import ACTUATOR, NOISE, machine_of, recorded
+
+WARMS_UP = Described(
+    "~m", "memory", "electrical_c", 0, (("source", 2.0, 0.0, ""), ("time_constant", 0.12, 0.01, "s")), 0.1, 1.0
+)
+
+
+def test_a_voltage_that_goes_with_time_alone_is_its_channels():
+    said = telling.told(WARMS_UP, {"gain": (0.05, 0.001)}, ACTUATOR)
+    assert (said["equation"], said["form"], said["along"]) == ("sensor_voltage", "drift", "time")
+    assert said["parameters"]["offset"]["value"] == 0.05 and said["parameters"]["time_constant"]["value"] == 0.12
+    assert said["sentence"] == (
+        "In the measuring chain: the recorded voltage of phase c drifts by 0.05 V from the start, "
+        "with a time constant of 0.12 s."
+    )
+
+
+@pytest.mark.parametrize(("change", "equation", "form"), [
+    ({"driver": 1}, "electrical_c", "memory"), ({"equation": "torque"}, "torque", "memory"),
+    ({"shape": (("source", 0.0, 0.0, ""), ("time_constant", 0.12, 0.01, "s"))}, "electrical_c", "memory"),
+])  # fmt: skip
+def test_what_is_the_machines_stays_there(change, equation, form):
+    said = telling.told(replace(WARMS_UP, **change), {"gain": (0.05, 0.001)}, ACTUATOR)
+    assert (said["equation"], said["form"]) == (equation, form)
+
+
+def test_a_wave_of_the_recorded_angle_moves_the_commutations_of_the_point():
+    recording = recorded("reversal")
+    wave = 2e-4 * np.cos(recording.rotor_angle)
+    one = machine_of({"a.nc": recording})
+    values = {n: p.off for n, p in one.parameters.items()} | {"controller.commutation_time": 3e-5}
+    x = wave[None] / NOISE.angle
+    (before,) = [b for b in one.blocks(values, "a.nc", wanted=()) if b.equation == "commutation"]
+    column = one.seen_at(values, "a.nc", x)[0]
+    other = machine_of({"a.nc": recording})
+    other.recordings["a.nc"] = one.recordings["a.nc"].less("angle", wave)
+    (after,) = [b for b in other.blocks(values, "a.nc", wanted=()) if b.equation == "commutation"]
+    moved = after.residual - before.residual
+    assert "commutation" not in one.seen_in("angle", "a.nc", x)
+    assert np.corrcoef(moved, NOISE.angle * column)[0, 1] > 0.99
+    assert np.std(NOISE.angle * column) == pytest.approx(np.std(moved), rel=0.05)
+
+
+def test_a_wave_of_the_speeds_scale_may_be_one_of_the_angle():
+    machine = machine_of({"a.nc": recorded()})
+    assert machine.channels("sensor_speed", 1) == ("angle",) and machine.channels("torque", 1) == ()
