@@ -94,6 +94,7 @@ class Case:
     controller: Mapping[str, float] = field(default_factory=dict)  # factors of its settings, or its filter (s)
     plain: bool = False  # the twin without what is unlisted, under the nominal controller
     fixed_step: bool = False  # on the other integrator
+    again: int = 0  # the same unit once more: with other noise, or in other recordings
 
     @property
     def name(self) -> str:
@@ -107,9 +108,10 @@ class Case:
 
     @property
     def noise_seed(self) -> int:
-        """Seed of the sensors' noise; one of each bench, a plain twin's is the same."""
+        """Seed of the sensors' noise; one of each bench and repetition, a plain twin's is the same."""
         place = RUNGS.index("T1" if self.rung == "T3" else self.rung)
-        return FIRST * self.seed + place if place < FIRST else 2**40 + len(RUNGS) * self.seed + place
+        first = FIRST * self.seed + place if place < FIRST else 2**40 + len(RUNGS) * self.seed + place
+        return first + 2**41 * self.again
 
     def unit(self) -> dict[str, dict[str, float]]:
         """Tolerances and effects together, as the simulation takes them."""
@@ -194,6 +196,17 @@ def draw_case(rung: str, seed: int) -> Case:
         controller=controller,
         fixed_step=in_physics(unlisted) or FILTER in controller,
     )
+
+
+def in_other_noise(case: Case, again: int) -> Case:
+    """The same bench recorded once more."""
+    return replace(case, again=again)
+
+
+def in_other_recordings(case: Case, again: int) -> Case:
+    """The same unit in recordings of its own: other motions, temperatures, health and intervals."""
+    rng = np.random.default_rng([RUNGS.index(case.rung), case.seed, again])
+    return replace(case, recordings=draw_bench(case.strong_faults, rng), again=again)
 
 
 def without_effect(case: Case) -> Case:
