@@ -215,6 +215,8 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "runs": sampling["runs"] if part == "training" else sampling["fresh"],
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
     }
+    if config["unlisted"]:
+        spec["unlisted"] = config["unlisted"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)

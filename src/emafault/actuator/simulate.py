@@ -8,9 +8,10 @@ import numpy as np
 from ..compiled import attributed
 from ..errors import InputError
 from .conduction import LANES
+from .grammar import MOST_TERMS
 from .kernel import run_batch
 from .state import RUN_STATE, has_extras
-from .unlisted import MOST_TERMS, no_terms
+from .unlisted import no_terms
 
 PHASE_SIGNALS = ("phase_voltage", "phase_current", "phase_current_end")
 SIGNALS = (*PHASE_SIGNALS, "rotor_speed", "rotor_angle", "output_position", "bus_voltage")
@@ -56,7 +57,7 @@ def simulate(
 
     Raises
     ------
-    InputError : an interval or duration that is not positive, or more terms than ``unlisted.MOST_TERMS``
+    InputError : an interval or duration that is not positive, or more terms than ``grammar.MOST_TERMS``
     """
     if not (interval > 0.0 and duration >= interval):
         raise InputError(

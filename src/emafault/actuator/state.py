@@ -5,11 +5,11 @@ import numpy as np
 from ..compiled import compiled
 from .conduction import NEVER
 from .friction import coulomb_torque, static_limit
+from .grammar import MOST_TERMS
 from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 from .unlisted import (
     EMF,
     INERTIA,
-    MOST_TERMS,
     PLACES,
     RESISTANCE,
     TORQUE,

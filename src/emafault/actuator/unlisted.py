@@ -5,23 +5,17 @@ simulation evaluates every term in the middle of each step. The event-driven one
 value that it has in the piece's middle (``longest_hold``), so that a run without terms pays nothing.
 """
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
 from ..compiled import compiled
+from .grammar import COORDINATES, KNOTS, MACHINE, SOURCES, of_recording
 
-#: where a term acts: added to the driving torque (N m), to a phase's back-EMF as a share of it, to its resistance
-#: (ohm), to the torque against the motion (N m), to the electrical torque and to the rotor's inertia as a share of each
-PLACES = (
-    "torque", "emf_a", "emf_b", "emf_c", "resistance_a", "resistance_b", "resistance_c", "drag", "torque_constant",
-    "inertia",
-)  # fmt: skip
+PLACES = tuple(MACHINE)
 TORQUE, EMF, RESISTANCE, DRAG, TORQUE_CONSTANT, INERTIA = 0, 1, 4, 7, 8, 9
-#: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
-#: of the magnitudes), the angle turned since the start over the gear ratio, time, the soak temperature
-COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
 CURRENT = list(COORDINATES).index("current")
-SOURCES = ("loss", "speed")  # of a memory: (current / 2)^2 (A2), magnitude of the speed over 100 rad/s
-KNOTS = 6  # of a function, equally spaced
 #: form -> names of its parameters, in the order of the row. SI; w is the rotor's speed and theta its angle, unwrapped.
 SHAPES = {
     "order": ("amplitude", "order", "phase"),  # amplitude cos(order theta + phase)
@@ -42,7 +36,6 @@ CUBIC = 4 * (KNOTS - 1)  # coefficients of a spline
 _WIDTH = 2 + 3 + CUBIC
 ORDER, FREQUENCY, STEP, POWER, BUMP, MEMORY, SWEEP, BURST, TRAVEL, WANDER, FUNCTION = range(len(SHAPES))
 TWO_PI = 2.0 * np.pi
-MOST_TERMS = 8  # of a run of the event-driven simulation
 HOLD = 5.0e-5  # s, that a term is held at most
 FINE = 0.2  # rad of a wave, or of a bump's width, that it is held over
 SHORTEST_HOLD = 2.0e-6  # s
@@ -62,6 +55,46 @@ def term(place: str, shape: str, **parameters: float) -> np.ndarray:
         numbers[3:] = spline.c.T.ravel()
     row[2 : 2 + len(numbers)] = numbers
     return row
+
+
+def row_of(entry: Mapping[str, Any], place: str = "") -> np.ndarray:
+    """(number,) row of an entry of a configuration, its own place in the machine or another; a phase left out is 0."""
+    numbers = {n: v for n, v in entry.items() if n not in ("place", "form", "along", "values", "source")}
+    if entry["form"] == "function":
+        numbers["coordinate"] = list(COORDINATES).index(entry["along"])
+        numbers |= {f"at_{n + 1}": v for n, v in enumerate(entry["values"])}
+    if entry["form"] == "memory":
+        numbers["source"] = SOURCES.index(entry["source"])
+    return term(place or entry["place"], entry["form"], **{"phase": 0.0} | numbers)
+
+
+def in_machine(
+    entries: Sequence[Mapping[str, Any]], runs: int, seed: int = 0, first_run: int = 0, recording: str = ""
+) -> np.ndarray:
+    """Terms of the entries that act in the machine.
+
+    Parameters
+    ----------
+    entries : as a configuration has them, checked
+    runs, seed, first_run : a phase left out is drawn for each run by its number
+    recording : name of the recording that is replayed, if any
+
+    Returns
+    -------
+    (run, term, number) rows of ``term``
+    """
+    mine = [of_recording(e, recording) for e in entries if e["place"] in MACHINE]
+    rows = np.array([row_of(e) for e in mine]).reshape(len(mine), _WIDTH)
+    out = np.repeat(rows[None], runs, axis=0)
+    for m, entry in enumerate(mine):
+        if entry["form"] == "frequency" and "phase" not in entry:
+            out[:, m, 4] = [drawn_phase(seed, first_run + r, m) for r in range(runs)]
+    return out
+
+
+def drawn_phase(seed: int, run: int, number: int) -> float:
+    """Phase (rad) of a wave in time in one run."""
+    return float(np.random.default_rng([seed, 5, run, number]).uniform(0.0, TWO_PI))
 
 
 def no_terms() -> np.ndarray:
@@ -160,3 +193,14 @@ def longest_hold(terms, t, w):
         if (shape == STEP or shape == BURST) and t < b < t + hold:
             hold = b - t
     return hold
+
+
+@compiled
+def followed(row, t, theta, w, current, turned, temperature):
+    """(time,) values of a term, whose state begins at zero, along (time,) arrays of what ``acting`` takes."""
+    out, memory, nothing = np.empty(len(t)), 0.0, np.zeros(2)
+    for n in range(len(t)):
+        if n > 0:
+            memory = remembered(row, w[n], current[n], memory, t[n] - t[n - 1])
+        out[n] = acting(row, t[n], theta[n], w[n], current[n], turned[n], temperature, memory, nothing)
+    return out
