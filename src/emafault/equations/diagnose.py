@@ -23,7 +23,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
-from . import telling
+from . import carried, telling
 from .held_out import HeldOut, held_to_account
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
@@ -328,9 +328,11 @@ def _discovered(
             found = curve(bench.machine, described[form], blocks, bench.carried, values)
             entry = telling.told(described[form], linear, machine.actuator)
             entry["curve"] = telling.picture(described[form], found, machine.actuator)
+            entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
         else:
             units = {p.name: p.units for p in unit.parameters}
             entry = telling.told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+            entry["term"] = carried.of_chain(form, linear)
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,
