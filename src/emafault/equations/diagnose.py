@@ -37,8 +37,6 @@ from .terms import TERMS
 SCHEMA = "2.0"
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
-TOLD = 3.0  # standard deviations from nominal at which a controller's gain is told as different
-TELLING = 0.02  # of a gain: smaller differences are not worth telling
 
 
 @dataclass(frozen=True)
@@ -196,7 +194,8 @@ def _diagnosed(
         for n, p in entry.get("parameters", {}).items()
     ]
     before = _simulator(bench, before_point, ())
-    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if fitted else before}
+    found_any = fitted or reading.forms  # what is described changes the unit as well as an effect does
+    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if found_any else before}
     if held_out is not None:
         verdict["held_out"] = {e: round(r, 3) for e, r in held_out.ratios.items()}
     verdict["next_experiment"] = []

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .carried import entries, left_out
+from .telling import differing_gains
 
 PACKAGE = "# @package _global_"  # where an experiment's keys go
 
@@ -20,7 +21,7 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
 
     rounded = {e: {p: float(f"{v:.8g}") for p, v in values.items()} for e, values in effects.items()}
     named = sorted({e for e in verdict["which"][0]["effects"] if e != "unknown"})
-    unlisted = entries(verdict)
+    unlisted, gains = entries(verdict), differing_gains(verdict)
     words = [*named, *(["what no catalogue lists"] if unlisted else []), "its unit's tolerances"]
     what = _in_words(words) if len(words) > 1 else f"{words[0]} alone"
     content: dict[str, Any] = {
@@ -28,6 +29,8 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
         "question": f"How well is the actuator of bench {verdict['bench']} identified with {what} simulated?",
         "effects": rounded,
     }
+    if gains:
+        content["actuator"] = {gain: float(f"{g['value']:.8g}") for gain, g in gains.items()}
     if unlisted:
         content["unlisted"] = unlisted
     body = OmegaConf.to_yaml(OmegaConf.create(content))
