@@ -9,6 +9,7 @@ from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
 from emafault.actuator.unlisted import COORDINATES, PLACES, SHAPES, acting, remembered, term
 from emafault.config import reference_actuator
+from emafault.effects import EFFECTS
 from emafault.errors import InputError
 
 TABLE = np.array([0.0, 1.0, 3.0, 3.0])
@@ -167,6 +168,28 @@ def test_both_simulations_agree(nominal, place, shape, parameters):
 
     assert apart(ours, theirs) < 4e-3
     assert apart(ours, nominal) > 3.0 * apart(ours, theirs)
+
+
+TOGETHER = np.array(
+    [term("torque", "order", **SEEN["order"]), term("drag", "power", **SEEN["power"])]
+    + [term(place, shape, **parameters) for place, (shape, parameters) in list(ELSEWHERE.items())[:5]]
+)
+
+
+@pytest.mark.parametrize(
+    "effect", ["compliance", "self_heating", "bus_resistance", "inductance_saturation", "speed_latency", "cogging"]
+)
+def test_both_simulations_agree_beside_listed_effects(nominal, effect):
+    """Those that take another way through the event-driven run, or have a state of their own."""
+    values = {n: p.low + 0.8 * (p.high - p.low) for n, p in EFFECTS[effect].parameters.items()}
+    runs = make_runs(ACTUATOR, np.array([[0.08, 0.03, 0.0, 0.12, -0.05, 40.0]]), effects={effect: values}, theta_0=0.7)
+    plain, ours = (stretches(simulate(runs, TO_AND_FRO, 0.3, 2e-4, terms=t)) for t in (None, TOGETHER))
+    theirs = stretches(simulate_fixed_step(runs, TO_AND_FRO, 0.3, 2e-4, 2e-6, terms=TOGETHER))
+
+    def apart(one, other):
+        return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
+
+    assert apart(ours, theirs) < 4e-3 < 0.1 * apart(ours, plain)
 
 
 def test_every_shape_and_place_is_compared():

@@ -13,7 +13,17 @@ import numpy as np
 from ..compiled import compiled
 from ..effects import EFFECTS
 from ..errors import InputError
-from .unlisted import EMF, INERTIA, PLACES, RESISTANCE, TORQUE, TORQUE_CONSTANT, add_up, no_terms, remembered
+from .unlisted import (
+    AT_EMF,
+    AT_INERTIA,
+    AT_RESISTANCE,
+    AT_TORQUE,
+    AT_TORQUE_CONSTANT,
+    PLACES,
+    add_up,
+    no_terms,
+    remembered,
+)
 
 #: effects that have an alternative form; the position in this tuple is the flag's index in the kernel
 FORMS = tuple(sorted(EFFECTS))
@@ -340,9 +350,9 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
                     if forms[F_DYNAMIC]:
                         swing = swing / (1.0 - swing) + 0.2 * record.dynamic_eccentricity_d * np.cos(2.0 * y)
                     k[j] *= 1.0 + swing
-                k[j] *= 1.0 + added[EMF + j]
+                k[j] *= 1.0 + added[AT_EMF + j]
                 e[j] = k[j] * w_mid
-                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j] + added[RESISTANCE + j]
+                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j] + added[AT_RESISTANCE + j]
             lag = i_bus_2 if forms[F_BUS_R] else i_bus
             bus = record.bus_voltage_Vdc - record.bus_resistance_R * lag
             if forms[F_BUS_V]:
@@ -484,7 +494,7 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
             drag = B * record.viscous_friction_scale * w
             if forms[F_VISCOUS]:
                 drag = B * w + (record.viscous_friction_scale - 1.0) * B * np.sign(w) * abs(w) ** 0.8 * 100.0**0.2
-            active = torque * (1.0 + added[TORQUE_CONSTANT]) - drag + added[TORQUE]
+            active = torque * (1.0 + added[AT_TORQUE_CONSTANT]) - drag + added[AT_TORQUE]
             if record.cogging_a != 0.0:
                 active -= record.cogging_a * np.sin(slots * theta)
             if forms[F_COGGING]:
@@ -531,7 +541,7 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
                 T_F = min(max(active, -static), static)
             else:
                 T_F = sliding * direction
-            w_new = w + dt * (active - T_F) / (J_motor * (1.0 + added[INERTIA]))
+            w_new = w + dt * (active - T_F) / (J_motor * (1.0 + added[AT_INERTIA]))
             if not forms[F_STRIBECK] and w * w_new < 0.0:
                 w_new = 0.0
             acceleration = (w_new - w) / dt

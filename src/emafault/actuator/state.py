@@ -8,12 +8,12 @@ from .friction import coulomb_torque, static_limit
 from .grammar import MOST_TERMS
 from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
 from .unlisted import (
-    EMF,
-    INERTIA,
+    AT_EMF,
+    AT_INERTIA,
+    AT_RESISTANCE,
+    AT_TORQUE,
+    AT_TORQUE_CONSTANT,
     PLACES,
-    RESISTANCE,
-    TORQUE,
-    TORQUE_CONSTANT,
     add_up,
     longest_hold,
     remembered,
@@ -166,18 +166,18 @@ def hold_terms(p, s, terms, table, ends_at):
     turned = (theta - p.theta_0) / p.gear_ratio
     soak = p.reference_temperature + p.dT
     add_up(terms, s.t + half, theta, w, current, turned, soak, memory, table, added)
-    torque = added[TORQUE]
-    if added[TORQUE_CONSTANT] != 0.0:
+    torque = added[AT_TORQUE]
+    if added[AT_TORQUE_CONSTANT] != 0.0:
         cell, into = s.cell, p.pole_pairs * s.theta - s.turns * TWO_PI - s.edge[s.cell]
         for j in range(3):
             f = s.value[cell, j] + s.slope[cell, j] * into
             if s.modulated:
                 f = modulate(p, s.theta, j, f, 0.0)[0]
-            torque += added[TORQUE_CONSTANT] * k[j] * f * i[j]
+            torque += added[AT_TORQUE_CONSTANT] * k[j] * f * i[j]
     s.added_torque = torque
-    s.inverse_inertia = 1.0 / (s.inertia * (1.0 + added[INERTIA]))
+    s.inverse_inertia = 1.0 / (s.inertia * (1.0 + added[AT_INERTIA]))
     for j in range(3):
-        k[j] = k_listed[j] * (1.0 + added[EMF + j])
-        R[j] = R_winding[j] * (1.0 + p.copper_coefficient * (p.dT + s.heat)) + R_outside[j] + added[RESISTANCE + j]
+        k[j] = k_listed[j] * (1.0 + added[AT_EMF + j])
+        R[j] = R_winding[j] * (1.0 + p.copper_coefficient * (p.dT + s.heat)) + R_outside[j] + added[AT_RESISTANCE + j]
     s.largest_k = abs(k[0]) + abs(k[1]) + abs(k[2])
     s.slow = FLOATING * p.bus_voltage_Vdc / s.largest_k

@@ -14,7 +14,7 @@ from ..compiled import compiled
 from .grammar import COORDINATES, KNOTS, MACHINE, SOURCES, of_recording
 
 PLACES = tuple(MACHINE)
-TORQUE, EMF, RESISTANCE, DRAG, TORQUE_CONSTANT, INERTIA = 0, 1, 4, 7, 8, 9
+AT_TORQUE, AT_EMF, AT_RESISTANCE, AT_DRAG, AT_TORQUE_CONSTANT, AT_INERTIA = 0, 1, 4, 7, 8, 9
 CURRENT = list(COORDINATES).index("current")
 #: form -> names of its parameters, in the order of the row. SI; w is the rotor's speed and theta its angle, unwrapped.
 SHAPES = {
@@ -37,7 +37,7 @@ _WIDTH = 2 + 3 + CUBIC
 ORDER, FREQUENCY, STEP, POWER, BUMP, MEMORY, SWEEP, BURST, TRAVEL, WANDER, FUNCTION = range(len(SHAPES))
 TWO_PI = 2.0 * np.pi
 HOLD = 5.0e-5  # s, that a term is held at most
-FINE = 0.2  # rad of a wave, or of a bump's width, that it is held over
+HELD_OVER = 0.2  # rad of a wave, or of a bump's width, that it is held over
 SHORTEST_HOLD = 2.0e-6  # s
 RIPPLE_HOLD = 5.0e-6  # s, of what follows the current, which takes about 30 us from one switching to the next
 
@@ -166,7 +166,7 @@ def add_up(terms, t, theta, w, current, turned, temperature, memory, table, adde
     for m in range(len(terms)):
         place = int(terms[m, 0])
         added[place] += acting(terms[m], t, theta, w, current, turned, temperature, memory[m], table)
-    added[TORQUE] -= np.sign(w) * added[DRAG]
+    added[AT_TORQUE] -= np.sign(w) * added[AT_DRAG]
 
 
 @compiled
@@ -186,10 +186,10 @@ def longest_hold(terms, t, w):
             rate = TWO_PI * abs(b + c * t)
         elif shape == BURST:
             rate = TWO_PI * abs(d)
-        if terms[m, 0] == TORQUE_CONSTANT or (shape == FUNCTION and terms[m, 2] == CURRENT):
+        if terms[m, 0] == AT_TORQUE_CONSTANT or (shape == FUNCTION and terms[m, 2] == CURRENT):
             hold = min(hold, RIPPLE_HOLD)
-        if rate * hold > FINE:
-            hold = max(FINE / rate, SHORTEST_HOLD)
+        if rate * hold > HELD_OVER:
+            hold = max(HELD_OVER / rate, SHORTEST_HOLD)
         if (shape == STEP or shape == BURST) and t < b < t + hold:
             hold = b - t
     return hold
