@@ -71,8 +71,8 @@ def _replay(args: argparse.Namespace) -> None:
     InputError : an option that a replay does not take, or a bench or experiment that cannot be used
     """
     from .. import config
+    from ..equations.replay import replay_bench, table
     from ..errors import InputError
-    from ..study.replay import replay_bench, table
 
     if args.fault or args.health or args.unit:
         raise InputError("--replay: takes fault, health and unit from the bench, accepted are overrides and --seed")

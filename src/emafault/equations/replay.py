@@ -5,6 +5,7 @@ generalised features, and means over 10 ms; what two runs of the corrected simul
 another start of the switching, is the least that can be reached.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,12 +18,12 @@ from ..actuator.parameters import ActuatorParameters, make_runs
 from ..dataset import as_batch, simulate_and_measure
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..io.atomic import write_text
 from ..io.bench import new_folder, read_bench
 from ..io.recording import Recording, write_recording
 from ..progress import progress
 from ..reconstruction import reconstruct
-from ..reporting.written import VERDICT
-from .networks import read_json, write_json
+from ..reporting.written import VERDICT, to_json
 
 WINDOW = 0.01  # s, over which signals are averaged
 ASIDE = 1e-4  # rad, by which the start of the repetition is off
@@ -107,7 +108,7 @@ def replay_bench(
         *squares, weights = np.concatenate(off[quantity], axis=1).sum(axis=1)
         compared[quantity] = Compared(*(float(np.sqrt(x / weights)) for x in squares))
     rows = {q: vars(c) | {"closed": c.closed, "units": UNITS[q]} for q, c in compared.items()}
-    write_json(folder / "replay.json", rows)
+    write_text(folder / "replay.json", to_json(rows))
     return compared, "the unit fitted without any effect" if verdict else "the nominal actuator"
 
 
@@ -124,7 +125,7 @@ def table(compared: Mapping[str, Compared], without: str) -> str:
 
 def _verdict(path: Path, recordings: Mapping[str, Recording]) -> dict[str, Any] | None:
     """The verdict of a file if it is one on these recordings."""
-    verdict = read_json(path) if path.is_file() else {}
+    verdict = json.loads(path.read_text()) if path.is_file() else {}
     return verdict if "simulator" in verdict and set(verdict["fault_vector"]) & set(recordings) else None
 
 
