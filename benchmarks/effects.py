@@ -20,6 +20,7 @@ from emafault.actuator.commands import command_positions
 from emafault.actuator.conduction import LANES
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.state import RUN_STATE
+from emafault.actuator.unlisted import no_terms
 from emafault.compiled import OPTIONS
 from emafault.config import reference_actuator
 from emafault.effects import EFFECTS
@@ -31,7 +32,7 @@ ROUNDING = 1e-13  # differences above this would be another physics
 def specialised() -> tuple[dict, int]:
     """Names of the kernel compiled without effects, and how many fields were replaced."""
     folder = Path(kernel.__file__).parent
-    modules = ("motor", "friction", "conduction", "state", "instants", "lane", "kernel")
+    modules = ("motor", "friction", "conduction", "grammar", "unlisted", "state", "instants", "lane", "kernel")
     source = "\n".join((folder / f"{name}.py").read_text() for name in modules)
     source = re.sub(r"^from \.[^\n(]*(\([^)]*\))?", "", source, flags=re.MULTILINE)
     replaced = 0
@@ -58,11 +59,12 @@ def main() -> None:
     outs = [[np.zeros((*shape, 3)) for _ in range(3)] + [np.zeros(shape) for _ in range(4)] for _ in engines]
     state = np.zeros(LANES, RUN_STATE)
     timing = np.full(LANES, interval), np.full(LANES, records)
+    unlisted = no_terms()[None], np.zeros(2)
     best = [np.inf, np.inf]
     for n in range(repeats + 1):
         for e, engine in enumerate(engines):
             start = time.process_time()
-            engine(state, runs, np.arange(LANES), command, *timing, *outs[e])
+            engine(state, runs, np.arange(LANES), command, *timing, *unlisted, *outs[e])
             if n:  # the first call compiles
                 best[e] = min(best[e], (time.process_time() - start) / LANES)
     # the compiler contracts and reorders a + b c by what is left of an expression, so the last bit may differ

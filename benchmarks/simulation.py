@@ -20,6 +20,7 @@ from emafault.actuator.conduction import LANES
 from emafault.actuator.fixed_step import simulate_fixed_step
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
+from emafault.actuator.unlisted import term
 from emafault.config import reference_actuator
 from solve_ivp_engine import simulate_solve_ivp
 
@@ -77,10 +78,14 @@ def main() -> None:
     print(f"\nreference: {truth[0]:.4f} rad/s, {truth[1]:.4f} A, ripple {truth[2]:.4f} A\n")
 
     eight = make_runs(actuator, np.zeros((LANES, 6)))
+    wave = term("torque", "order", amplitude=0.01, order=2.4, phase=0.0)[None]
     print(f"| {LANES} runs | processor time per run and simulated s (s) | over one run alone |")
     print("|---|---|---|")
     many: dict[str, Callable[[float], dict]] = {
         "event-driven, side by side in lanes": lambda d: simulate(eight, command, d, interval),
+        "the same with a wave in the torque that no catalogue lists": lambda d: simulate(
+            eight, command, d, interval, terms=wave
+        ),
         "fixed step 2 us, one after another": lambda d: simulate_fixed_step(eight, command, d, interval, 2e-6),
     }
     for name, engine in many.items():

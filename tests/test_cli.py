@@ -135,3 +135,18 @@ def test_noise_repeats_with_its_seed(tmp_path):
         )
     a, b, c = (read_recording(tmp_path / f"{name}.nc").phase_voltage for name in "abc")
     assert np.array_equal(a, b) and not np.array_equal(a, c)
+
+
+def test_identification_before_and_after_the_chain_is_corrected(tmp_path):
+    """The folder that stands for the corrected recordings has them without what the chain does."""
+    from emafault.cli.diagnose import identified
+
+    talk = "unlisted=[{place: current_a, form: crosstalk, source: b, gain: 0.05}]"
+    for name, more in {"bench": [talk], "corrected": []}.items():
+        (tmp_path / name).mkdir()
+        assert main(["simulate", str(tmp_path / name / "a.nc"), "--fault", "Na=0.05", "dT=20", *more]) == 0
+    head, recorded, corrected, true, note = identified(tmp_path / "bench", tmp_path / "corrected").splitlines()
+    assert head.split()[-6:] == list(FAULT_NAMES) and "closed_form" in note and "a.nc" in recorded
+    rows = [np.array([float(x) for x in line.split()[-6:]]) for line in (recorded, corrected, true)]
+    assert rows[2] == pytest.approx([0.05, 0.0, 0.0, 0.0, 0.0, 20.0])
+    assert np.abs(rows[1][:5] - rows[2][:5]).max() < 0.01 < np.abs(rows[0][:5] - rows[2][:5]).max()

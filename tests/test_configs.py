@@ -52,6 +52,42 @@ def test_every_option_of_a_group_composes(group, tmp_path):
         ("+search.space.network.depth=[1]", ("search.space.network.depth", "activation, coordinates, layers, width")),
         ("reconstruction.paper.threshold=-1", ("reconstruction.paper.threshold", "-1", "from 0")),
         ("'", ("overrides", "quotation")),
+        ("unlisted=3", ("unlisted", "3", "a list of entries")),
+        ("'unlisted=[{place: rotor, form: order}]'", ("unlisted[0].place", "'rotor'", "torque, emf_a")),
+        ("'unlisted=[{place: drag, form: lag}]'", ("unlisted[0].form", "'lag'", "order", "in drag")),
+        ("'unlisted=[{place: torque, form: bump, depth: 1, centre: 0}]'", ("unlisted[0].width", "missing", "depth")),
+        (
+            "'unlisted=[{place: torque, form: step_change, jump: a, time: 0}]'",
+            ("unlisted[0].jump", "'a'", "a number", "(N m)"),
+        ),
+        (
+            "'unlisted=[{place: emf_a, form: step_change, jump: -1.5, time: 0}]'",
+            ("unlisted[0].jump", "-1.5", "from -0.9 to 0.9"),
+        ),
+        (
+            "'unlisted=[{place: drag, form: power, at_100_rad_s: 0.1, exponent: 2, order: 1}]'",
+            ("unlisted[0].order", "exponent"),
+        ),
+        (
+            "'unlisted=[{place: drag, form: function, along: angle, from: 0, to: 1, values: [1,2,3,4,5,6]}]'",
+            ("unlisted[0].along", "'angle'", "rotor_speed"),
+        ),
+        (
+            "'unlisted=[{place: drag, form: function, along: time, from: 0, to: 1, values: [1, 2]}]'",
+            ("unlisted[0].values", "[1, 2]", "a list of 6 numbers"),
+        ),
+        (
+            "'unlisted=[{place: drag, form: function, along: time, from: 2, to: 1, values: [1,2,3,4,5,6]}]'",
+            ("unlisted[0].to", "above unlisted[0].from = 2"),
+        ),
+        (
+            "'unlisted=[{place: current_a, form: crosstalk, source: d, gain: 0.1}]'",
+            ("unlisted[0].source", "'d'", "a, b, c"),
+        ),
+        (
+            "'unlisted=[{place: current_a, form: drift, at_end: 1, recordings: {one: {end: 1}}}]'",
+            ("unlisted[0].recordings.one.end", "at_end"),
+        ),
     ],
 )
 def test_refusals_name_key_value_and_what_is_accepted(overrides, says):

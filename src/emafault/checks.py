@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from . import schema
+from .actuator.grammar import MACHINE, MOST_TERMS
 from .errors import InputError
 
 _SCHEMAS = {
@@ -36,7 +37,7 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    known = {*_SCHEMAS, "command", "reconstruction", "question"}
+    known = {*_SCHEMAS, "command", "reconstruction", "question", "unlisted"}
     for key in config:
         if key not in known:
             raise InputError(schema.unknown_key(key, "", sorted(known)))
@@ -54,6 +55,10 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     if config["command"]["name"] == "file" and not Path(config["command"]["path"]).is_file():
         schema.refuse("command.path", config["command"]["path"], "the path of an existing file")
     _check_effects(config["effects"])
+    schema.check_unlisted(config["unlisted"])
+    in_machine = sum(entry["place"] in MACHINE for entry in config["unlisted"])
+    if in_machine > MOST_TERMS:
+        schema.refuse("unlisted", f"{in_machine} entries in the machine", f"{MOST_TERMS} at most")
     recording = config["recording"]
     intervals = recording["duration"] / recording["interval"]
     if abs(intervals - round(intervals)) > 1e-6:

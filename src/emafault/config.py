@@ -215,6 +215,8 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "runs": sampling["runs"] if part == "training" else sampling["fresh"],
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
     }
+    if config["unlisted"]:
+        spec["unlisted"] = config["unlisted"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)
@@ -291,13 +293,22 @@ def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     return recursively_sorted(_pick(config, "actuator", "sensors", "tracking"))
 
 
+def _most_accurate(config: Mapping[str, Any]) -> dict[str, Any]:
+    """The most accurate reconstruction that is configured."""
+    methods = config["reconstruction"]
+    return methods[next((m for m in ("weighted_floating", "weighted") if m in methods), list(methods)[-1])]
+
+
+def replay_spec(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What replaying a bench reads."""
+    return recursively_sorted({"dataset": dataset_spec(config, "fresh"), "reconstruction": _most_accurate(config)})
+
+
 def retraining_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     """What training a network for a diagnosed bench reads; the reconstruction is the most accurate configured."""
-    methods = config["reconstruction"]
-    method = next((m for m in ("weighted_floating", "weighted") if m in methods), list(methods)[-1])
     spec = {
         "dataset": dataset_spec(config, "training"),
-        "reconstruction": methods[method],
+        "reconstruction": _most_accurate(config),
         "seeds": min(3, config["evaluation"]["seeds"]),
     }
     return recursively_sorted(spec | _pick(config, "faults", "network", "training"))

@@ -106,20 +106,45 @@ def simulate_blocks(
 ) -> Iterator[Block]:
     """Simulate and measure runs ``first`` to ``last - 1`` of a part, block by block; faults as in ``sample_runs``."""
     from .actuator.commands import command_positions
-    from .actuator.sensors import SensorNoise, measure
-    from .actuator.simulate import simulate
 
     recording, settings = spec["recording"], dict(spec["command"])
     settings.pop("digest", None)
     duration, interval = recording["duration"], recording["interval"]
     command = command_positions(settings.pop("name"), settings, duration, spec["actuator"]["control_period"])
-    noise = SensorNoise(**spec["sensors"])
     sample = sample_runs(spec, faults)
     for start in range(first, last, BLOCK):
         rows = slice(start, min(start + BLOCK, last))
         runs = sample.records(rows)
-        signals = measure(simulate(runs, command, duration, interval), runs, noise, spec["seed"], first_run=start)
+        signals = simulate_and_measure(spec, runs, command, duration, interval, start)
         yield Block(start, interval, signals, sample.faults[rows])
+
+
+def simulate_and_measure(
+    spec: Mapping[str, Any],
+    runs: np.ndarray,
+    command: np.ndarray,
+    duration: float,
+    interval: float,
+    first_run: int = 0,
+    recording: str = "",
+) -> dict[str, np.ndarray]:
+    """Recorded signals of ``sensors.measure``, with what no catalogue lists in the machine and in the measuring chain.
+
+    Parameters
+    ----------
+    spec : the sub-tree ``config.dataset_spec``: its ``sensors``, ``seed`` and, if any, ``unlisted`` are read
+    runs, command, duration, interval : as ``actuator.simulate`` takes them
+    first_run : number of the first run, which its noise and whatever else is left to chance go by
+    recording : name of the recording that is replayed, if any
+    """
+    from .actuator.sensors import SensorNoise, measure
+    from .actuator.simulate import simulate
+    from .actuator.unlisted import in_machine
+
+    unlisted, seed = spec.get("unlisted", ()), spec["seed"]
+    terms = in_machine(unlisted, len(runs), seed, first_run, recording)
+    signals = simulate(runs, command, duration, interval, terms=terms)
+    return measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
 
 
 def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:

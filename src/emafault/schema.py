@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
 from typing import Any
 
+from .actuator import grammar
 from .actuator.parameters import ECCENTRICITY_LAWS, ActuatorParameters
 from .errors import InputError
 
@@ -284,6 +285,62 @@ def check(value: Any, schema: Any, key: str, metadata: Mapping = types.MappingPr
         accepted = metadata.get("accepted")
         if not isinstance(value, str) or not value or (accepted and value not in accepted):
             refuse(key, value, ", ".join(accepted) if accepted else "a word")
+
+
+def check_unlisted(entries: Any, key: str = "unlisted") -> None:
+    """Refuse entries of ``unlisted`` (see ``actuator.grammar``) that are not a place, a form and its parameters.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    if not isinstance(entries, list):
+        refuse(key, entries, "a list of entries, each with a place, a form and its parameters")
+    for n, entry in enumerate(entries):
+        at = f"{key}[{n}]"
+        if not isinstance(entry, dict):
+            refuse(at, entry, "a mapping with a place, a form and its parameters")
+        place = entry.get("place")
+        if place not in grammar.PLACES:
+            refuse(f"{at}.place", place, ", ".join(grammar.PLACES))
+        form = entry.get("form")
+        if form not in grammar.forms_at(place):
+            refuse(f"{at}.form", form, f"{', '.join(grammar.forms_at(place))} in {place}")
+        wanted = grammar.FORMS[form]
+        known = ["place", "form", *wanted, grammar.EACH]
+        for name in entry:
+            if name not in known:
+                raise InputError(unknown_key(name, at, known))
+        for name in wanted:
+            if name not in entry and name not in grammar.OPTIONAL.get(form, ()):
+                raise InputError(f"{at}.{name}: is missing; {form} has {', '.join(wanted)}")
+            if name in entry:
+                _check_parameter(entry[name], name, place, form, f"{at}.{name}")
+        if form == "function" and not entry["to"] > entry["from"]:
+            refuse(f"{at}.to", entry["to"], f"a number above {at}.from = {entry['from']}")
+        check(entry.get(grammar.EACH, {}), dict[str, dict[str, Any]], f"{at}.{grammar.EACH}")
+        for recording, own in entry.get(grammar.EACH, {}).items():
+            for name, value in own.items():
+                full = f"{at}.{grammar.EACH}.{recording}.{name}"
+                if name not in wanted:
+                    raise InputError(unknown_key(name, f"{at}.{grammar.EACH}.{recording}", list(wanted)))
+                _check_parameter(value, name, place, form, full)
+
+
+def _check_parameter(value: Any, name: str, place: str, form: str, key: str) -> None:
+    """Check one parameter of an entry of ``unlisted``."""
+    words = {"along": tuple(grammar.COORDINATES), "source": grammar.PHASES if form == "crosstalk" else grammar.SOURCES}
+    if name in words:
+        check(value, str, key, {"accepted": words[name]})
+        return
+    if name == "values" and not (isinstance(value, list) and len(value) == grammar.KNOTS):
+        refuse(key, value, f"a list of {grammar.KNOTS} numbers, at equally spaced knots")
+    low, high, unit = grammar.PARAMETERS.get(name, (*grammar.ANY, ""))
+    share = form != "memory" and grammar.PLACES[place] == "1"
+    if not unit and share and name not in ("from", "to"):
+        low, high = max(low, -grammar.SHARE), min(high, grammar.SHARE)
+    accepted = {"low": low, "high": high, "unit": unit or ("" if name in ("from", "to") else grammar.PLACES[place])}
+    check(value, list[float] if name == "values" else float, key, accepted)
 
 
 def refuse(key: str, got: Any, accepted: str) -> typing.NoReturn:

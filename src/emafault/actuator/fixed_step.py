@@ -13,7 +13,17 @@ import numpy as np
 from ..compiled import compiled
 from ..effects import EFFECTS
 from ..errors import InputError
-from .unlisted import acting, no_terms, remembered
+from .unlisted import (
+    AT_EMF,
+    AT_INERTIA,
+    AT_RESISTANCE,
+    AT_TORQUE,
+    AT_TORQUE_CONSTANT,
+    PLACES,
+    add_up,
+    no_terms,
+    remembered,
+)
 
 #: effects that have an alternative form; the position in this tuple is the flag's index in the kernel
 FORMS = tuple(sorted(EFFECTS))
@@ -267,7 +277,8 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
     forward = True
     queue_time, queue_value = np.zeros(64), np.zeros(64)
     queued = served = 0
-    memory, added = np.zeros(len(terms)), np.zeros(7)
+    memory, added = np.zeros(len(terms)), np.zeros(len(PLACES))
+    temperature = record.reference_temperature + ambient
     filtered, reference_share = 0.0, 1.0
     if filter_time > 0.0:
         reference_share -= np.exp(-Tc / filter_time)
@@ -316,11 +327,12 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
             if w == 0.0:
                 w_mid = 0.0
             middle_angle = theta + 0.5 * dt * w_mid
-            for m in range(len(terms)):
-                if m == 0:
-                    added[:] = 0.0
-                added[int(terms[m, 0])] += acting(terms[m], now, middle_angle, w_mid, memory[m], wander)
-                memory[m] = remembered(terms[m], w_mid, memory[m], dt)
+            if len(terms) > 0:
+                current = 0.5 * (abs(i[0]) + abs(i[1]) + abs(i[2]))
+                turned = (middle_angle - record.theta_0) / ratio
+                add_up(terms, now, middle_angle, w_mid, current, turned, temperature, memory, wander, added)
+                for m in range(len(terms)):
+                    memory[m] = remembered(terms[m], w_mid, current, memory[m], dt)
             factor = 1.0
             if record.eccentricity_law == 1:
                 factor += record.eccentricity[0] * np.cos(theta) + record.eccentricity[1] * np.sin(theta)
@@ -338,9 +350,9 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
                     if forms[F_DYNAMIC]:
                         swing = swing / (1.0 - swing) + 0.2 * record.dynamic_eccentricity_d * np.cos(2.0 * y)
                     k[j] *= 1.0 + swing
-                k[j] *= 1.0 + added[1 + j]
+                k[j] *= 1.0 + added[AT_EMF + j]
                 e[j] = k[j] * w_mid
-                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j] + added[4 + j]
+                R[j] = R20[j] * (1.0 + record.copper_coefficient * (ambient + heat)) + Rx[j] + added[AT_RESISTANCE + j]
             lag = i_bus_2 if forms[F_BUS_R] else i_bus
             bus = record.bus_voltage_Vdc - record.bus_resistance_R * lag
             if forms[F_BUS_V]:
@@ -482,7 +494,7 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
             drag = B * record.viscous_friction_scale * w
             if forms[F_VISCOUS]:
                 drag = B * w + (record.viscous_friction_scale - 1.0) * B * np.sign(w) * abs(w) ** 0.8 * 100.0**0.2
-            active = torque - drag + added[0]
+            active = torque * (1.0 + added[AT_TORQUE_CONSTANT]) - drag + added[AT_TORQUE]
             if record.cogging_a != 0.0:
                 active -= record.cogging_a * np.sin(slots * theta)
             if forms[F_COGGING]:
@@ -529,7 +541,7 @@ def _run(record, command, samples, interval, step, forms, sampled, table, terms,
                 T_F = min(max(active, -static), static)
             else:
                 T_F = sliding * direction
-            w_new = w + dt * (active - T_F) / J_motor
+            w_new = w + dt * (active - T_F) / (J_motor * (1.0 + added[AT_INERTIA]))
             if not forms[F_STRIBECK] and w * w_new < 0.0:
                 w_new = 0.0
             acceleration = (w_new - w) / dt

@@ -25,7 +25,7 @@ from .friction import sliding_torque
 from .instants import SAME, control_tick, lagging, next_instant, record_interval
 from .lane import hand_over, take_back
 from .motor import TWO_PI, modulate
-from .state import COGGING_ORDER, FLOATING, begin
+from .state import COGGING_ORDER, FLOATING, begin, hold_terms
 
 STALLED = 1000  # segments without progress in time, after which a run is given up
 SHAFT_DAMPING = 2.0  # N m s/rad to ground, at the user shaft of the compliant transmission
@@ -57,7 +57,7 @@ def segment(p, s, ends_at):
     cogging_sine, cogging_cosine = s.cogging_sine, s.cogging_cosine
     shaft, w_shaft, contact, filtered = s.shaft, s.w_shaft, s.contact, s.filtered
     heat, bus_current, sum_bus = s.heat, s.bus_current, s.sum_bus
-    t, stalled = s.t, s.stalled
+    t, stalled, unlisted = s.t, s.stalled, s.added_torque
     while True:
         h, timed = ends_at - t, True
         if h > MAX_SEGMENT:
@@ -127,7 +127,7 @@ def segment(p, s, ends_at):
                 h = LARGEST_CHANGE / rate
                 timed = False
         # ---- mechanics: driving torque, acceleration
-        drive = Kp * ip + Km * im + Ko * io
+        drive = Kp * ip + Km * im + Ko * io + unlisted
         drive_1 = Kp * y1p + Km * y1m + Ko * y1o + w * (dKp * ip + dKm * im + dKo * io)
         if p.cogging_a != 0.0:
             drive -= p.cogging_a * cogging_sine
@@ -384,8 +384,9 @@ def segment(p, s, ends_at):
 
 @compiled
 def run_batch(
-    state, runs, rows, command, interval, records, voltage, current, current_end, speed, angle, position, bus
-):
+    state, runs, rows, command, interval, records, terms, table, voltage, current, current_end, speed, angle, position,
+    bus,
+):  # fmt: skip
     """Simulate runs and fill their recorded signals.
 
     Parameters
@@ -395,10 +396,12 @@ def run_batch(
     rows : (n,) which of them; best those with extras (see ``has_extras``) apart from those without
     command : (run or 1, tick+1) commanded user-shaft angle at the control ticks (rad)
     interval, records : (run,) recording interval (s) and how many of them each run lasts
+    terms : (run or 1, term, number) causes that no catalogue lists, ``MOST_TERMS`` of a run at most
+    table : (entry,) what a term of shape ``table`` follows
     voltage, current, current_end : (run, time, phase) outputs (V, A, A)
     speed, angle, position, bus : (run, time) outputs (rad/s, rad, rad, V)
     """
-    lanes, x = len(state), np.zeros(ROWS * LANES)
+    lanes, x, unlisted = len(state), np.zeros(ROWS * LANES), terms.shape[1] > 0
     begun = going = min(lanes, len(rows))
     for lane in range(lanes):
         state[lane].row = -1
@@ -422,6 +425,10 @@ def run_batch(
                 if s.t >= s.tick * p.control_period - SAME:
                     control_tick(p, s, command[min(row, command.shape[0] - 1), min(s.tick, command.shape[1] - 1)])
                 ends_at = next_instant(p, s, interval[row])
+                if unlisted:
+                    if s.t >= s.held_until - SAME or s.moving != s.held_moving:
+                        hold_terms(p, s, terms[min(row, terms.shape[0] - 1)], table, ends_at)
+                    ends_at = min(ends_at, s.held_until)
                 if hand_over(p, s, x, lane, ends_at):
                     break
                 segment(p, s, ends_at)

@@ -109,7 +109,7 @@ def hand_over(p, s, x, lane, ends_at):
         duration = FINE / (s.fastest * abs(w))
     # ---- the torque against the motion
     ratio = p.gear_ratio
-    torque, stiffness, bend = p.load_constant_T / ratio, 0.0, 0.0
+    torque, stiffness, bend = p.load_constant_T / ratio - s.added_torque, 0.0, 0.0
     damping = s.viscous
     if moving != 0:
         coulomb = s.coulomb_forward if moving > 0 else s.coulomb_backward

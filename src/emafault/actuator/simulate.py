@@ -8,8 +8,10 @@ import numpy as np
 from ..compiled import attributed
 from ..errors import InputError
 from .conduction import LANES
+from .grammar import MOST_TERMS
 from .kernel import run_batch
 from .state import RUN_STATE, has_extras
+from .unlisted import no_terms
 
 PHASE_SIGNALS = ("phase_voltage", "phase_current", "phase_current_end")
 SIGNALS = (*PHASE_SIGNALS, "rotor_speed", "rotor_angle", "output_position", "bus_voltage")
@@ -29,7 +31,13 @@ def commanded_position(command: np.ndarray, control_period: float, time: np.ndar
 
 
 def simulate(
-    runs: np.ndarray, command: np.ndarray, duration: float, interval: float, threads: int = 1
+    runs: np.ndarray,
+    command: np.ndarray,
+    duration: float,
+    interval: float,
+    threads: int = 1,
+    terms: np.ndarray | None = None,
+    table: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Simulate runs of equal length and return their recorded signals without noise.
 
@@ -39,6 +47,8 @@ def simulate(
     command : (tick+1,) or (run, tick+1) commanded user-shaft angle at the control ticks (rad)
     duration, interval : length of the record and of one recording interval (s)
     threads : runs are shared out over so many threads; the result does not depend on it
+    terms : (term, number) or (run, term, number) causes that no catalogue lists, rows of ``unlisted.term``
+    table : (entry,) what a term of shape ``table`` follows, an entry every ``unlisted.TABLE_STEP``
 
     Returns
     -------
@@ -47,7 +57,7 @@ def simulate(
 
     Raises
     ------
-    InputError : an interval or duration that is not positive
+    InputError : an interval or duration that is not positive, or more terms than ``grammar.MOST_TERMS``
     """
     if not (interval > 0.0 and duration >= interval):
         raise InputError(
@@ -56,7 +66,7 @@ def simulate(
     time = time_axis(duration, interval)
     command = np.ascontiguousarray(np.atleast_2d(command), dtype=float)
     n = len(runs)
-    out = _run(runs, command, np.full(n, float(interval)), np.full(n, len(time)), threads)
+    out = _run(runs, command, np.full(n, float(interval)), np.full(n, len(time)), threads, terms, table)
     position = commanded_position(command, float(runs["control_period"][0]), time)
     out["commanded_position"] = np.broadcast_to(position, (n, len(time))).copy() if len(command) == 1 else position
     return out
@@ -88,9 +98,21 @@ def ways(runs: np.ndarray) -> np.ndarray:
 
 
 def _run(
-    runs: np.ndarray, command: np.ndarray, interval: np.ndarray, records: np.ndarray, threads: int = 1
+    runs: np.ndarray,
+    command: np.ndarray,
+    interval: np.ndarray,
+    records: np.ndarray,
+    threads: int = 1,
+    terms: np.ndarray | None = None,
+    table: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Recorded signals of ``run_batch``, as long as those of the longest run."""
+    rows_of_terms = no_terms() if terms is None else np.ascontiguousarray(terms, float)
+    if rows_of_terms.ndim == 2:
+        rows_of_terms = rows_of_terms[None]
+    if rows_of_terms.shape[1] > MOST_TERMS:
+        raise InputError(f"terms: got {rows_of_terms.shape[1]}, accepted are {MOST_TERMS} at most")
+    wander = np.zeros(2) if table is None else np.ascontiguousarray(table, float)
     shape = len(runs), int(records.max())
     shapes = [(*shape, 3)] * len(PHASE_SIGNALS) + [shape] * (len(SIGNALS) - len(PHASE_SIGNALS))
     ends = np.cumsum([np.prod(s) for s in shapes])
@@ -108,7 +130,8 @@ def _run(
 
     def part(rows: np.ndarray) -> None:
         state = attributed(np.zeros(LANES if len(rows) > 1 else 1, RUN_STATE))  # one alone goes faster by itself
-        run_batch(state, given, rows, command, interval, records, *(out[name] for name in SIGNALS))
+        unlisted = rows_of_terms, wander
+        run_batch(state, given, rows, command, interval, records, *unlisted, *(out[name] for name in SIGNALS))
 
     if threads <= 1 or len(parts) < 2:
         for rows in parts:

@@ -5,7 +5,19 @@ import numpy as np
 from ..compiled import compiled
 from .conduction import NEVER
 from .friction import coulomb_torque, static_limit
-from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, phase_constants
+from .grammar import MOST_TERMS
+from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
+from .unlisted import (
+    AT_EMF,
+    AT_INERTIA,
+    AT_RESISTANCE,
+    AT_TORQUE,
+    AT_TORQUE_CONSTANT,
+    PLACES,
+    add_up,
+    longest_hold,
+    remembered,
+)
 
 FLOATING = 0.5  # of the supply; below it the three back-EMFs together bring no floating terminal to a rail
 COGGING_ORDER = 72.0  # lcm(slots, poles)
@@ -51,7 +63,13 @@ CONDUCTION = [
     ("conducting", np.bool_), ("until", float), ("ends_at", float),
     ("K", float, 3), ("dK", float, 3), ("ddK", float, 3),
 ]  # fmt: skip
-RUN_STATE = np.dtype(CONSTANTS + STATE + SUMS + CONDUCTION, align=True)
+#: what no catalogue lists: the torque it adds (N m); from when until when terms are held (s) and in which direction of
+#: motion; what they add by place, and their states; constants without them
+UNLISTED = [
+    ("added_torque", float), ("held_from", float), ("held_until", float), ("held_moving", np.int64),
+    ("added", float, len(PLACES)), ("memory", float, MOST_TERMS), ("k_listed", float, 3), ("inertia", float),
+]  # fmt: skip
+RUN_STATE = np.dtype(CONSTANTS + STATE + SUMS + CONDUCTION + UNLISTED, align=True)
 
 
 @compiled
@@ -91,7 +109,7 @@ def begin(p, s, row):
     s.shaft_inertia = (1.0 - MOTOR_SHARE) * inertia * p.gear_ratio * p.gear_ratio
     if s.compliant:
         inertia *= MOTOR_SHARE
-    s.inverse_inertia = 1.0 / inertia
+    s.inverse_inertia, s.inertia = 1.0 / inertia, inertia
     s.viscous = p.viscous_friction * p.viscous_friction_scale
     s.coulomb_forward, s.coulomb_backward = coulomb_torque(p, 1.0), coulomb_torque(p, -1.0)
     s.limit_forward, s.limit_backward = static_limit(p, s.coulomb_forward), static_limit(p, s.coulomb_backward)
@@ -116,3 +134,50 @@ def begin(p, s, row):
     for slot in range(PENDING):
         pending_time[slot], pending_value[slot] = NEVER, 0.0
     s.start_theta, s.start_filtered, s.sum_bus = theta, 0.0, 0.0
+    s.added_torque, s.held_from, s.held_until, s.held_moving = 0.0, 0.0, 0.0, 0
+    k_listed, memory = s.k_listed, s.memory
+    for j in range(3):
+        k_listed[j] = k[j]
+    for m in range(MOST_TERMS):
+        memory[m] = 0.0
+
+
+@compiled
+def hold_terms(p, s, terms, table, ends_at):
+    """Take what no catalogue lists as it is in the middle of the time that follows, and say how long that is.
+
+    Parameters
+    ----------
+    p, s : records of RUN_DTYPE and RUN_STATE
+    terms : (term, number) rows of ``unlisted.term``
+    table : (entry,) what a term of shape ``table`` follows
+    ends_at : s, by which the time ends in any case
+    """
+    i, k, R, added, memory = s.i, s.k, s.R, s.added, s.memory
+    R_winding, R_outside, k_listed = s.R_winding, s.R_outside, s.k_listed
+    w = s.w if s.w != 0.0 else 1e-12 * s.moving  # which has its direction already as it breaks away
+    current = 0.5 * (abs(i[0]) + abs(i[1]) + abs(i[2]))
+    for m in range(len(terms)):
+        memory[m] = remembered(terms[m], w, current, memory[m], s.t - s.held_from)
+    s.held_from, s.held_moving = s.t, s.moving
+    s.held_until = min(s.t + longest_hold(terms, s.t, w), ends_at)
+    half = 0.5 * (s.held_until - s.t)
+    theta = s.theta + half * w
+    turned = (theta - p.theta_0) / p.gear_ratio
+    soak = p.reference_temperature + p.dT
+    add_up(terms, s.t + half, theta, w, current, turned, soak, memory, table, added)
+    torque = added[AT_TORQUE]
+    if added[AT_TORQUE_CONSTANT] != 0.0:
+        cell, into = s.cell, p.pole_pairs * s.theta - s.turns * TWO_PI - s.edge[s.cell]
+        for j in range(3):
+            f = s.value[cell, j] + s.slope[cell, j] * into
+            if s.modulated:
+                f = modulate(p, s.theta, j, f, 0.0)[0]
+            torque += added[AT_TORQUE_CONSTANT] * k[j] * f * i[j]
+    s.added_torque = torque
+    s.inverse_inertia = 1.0 / (s.inertia * (1.0 + added[AT_INERTIA]))
+    for j in range(3):
+        k[j] = k_listed[j] * (1.0 + added[AT_EMF + j])
+        R[j] = R_winding[j] * (1.0 + p.copper_coefficient * (p.dT + s.heat)) + R_outside[j] + added[AT_RESISTANCE + j]
+    s.largest_k = abs(k[0]) + abs(k[1]) + abs(k[2])
+    s.slow = FLOATING * p.bus_voltage_Vdc / s.largest_k

@@ -1,4 +1,4 @@
-"""``emafault simulate``: a fault vector and overrides -> one recording file."""
+"""``emafault simulate``: a fault vector and overrides -> one recording file; or a bench -> its replay."""
 
 import argparse
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser._negative_number_matcher = re.compile(r"^-\d*\.?\d+([eE][-+]?\d+)?$")  # argparse misses -2e-5
-    parser.add_argument("file", help="netCDF file to write")
+    parser.add_argument("file", help="netCDF file to write; with --replay the new folder of the replayed recordings")
     parser.add_argument(
         "overrides", nargs="*", metavar="OVERRIDE", help="Hydra overrides such as command=sine effects.stribeck.a=0.01"
     )
@@ -19,7 +19,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="VALUE",
         help="Na Nb Nc xi_x xi_y dT as six numbers, or only those that are not zero as Na=0.05 dT=30",
     )
-    parser.add_argument("--experiment", default="paper", metavar="NAME", help="experiment to start from (paper)")
+    parser.add_argument(
+        "--experiment", default="paper", metavar="NAME", help="experiment to start from, or such a file (paper)"
+    )
+    parser.add_argument(
+        "--replay",
+        metavar="BENCH",
+        help="simulate each recording of a bench by its own command, start and temperature, with and without what the "
+        "experiment corrects, and print what both differ by",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of noise and start angle (0)")
     parser.add_argument("--unit-seed", type=int, default=0, help="which unit, if unit=tolerance is given (0)")
     parser.add_argument("--unit", default="", help="name of the unit, kept in the file")
@@ -39,6 +47,9 @@ def run(args: argparse.Namespace) -> None:
     from ..dataset import simulate_recording
     from ..io.recording import write_recording
 
+    if args.replay:
+        _replay(args)
+        return
     fault, overrides = read_fault(args.fault)
     composed = config.compose(args.experiment, [*args.overrides, *overrides])
     spec = config.dataset_spec(composed, "fresh") | {"seed": args.seed, "unit_seed": args.unit_seed}
@@ -50,6 +61,27 @@ def run(args: argparse.Namespace) -> None:
         attributes["unit"] = args.unit
     write_recording(args.file, type(recording)(**{**vars(recording), "attributes": attributes}))
     print(f"{Path(args.file)}: {len(recording.time)} intervals of {recording.interval:g} s, fault {fault.tolist()}")
+
+
+def _replay(args: argparse.Namespace) -> None:
+    """Replay a bench and print what it differs by.
+
+    Raises
+    ------
+    InputError : an option that a replay does not take, or a bench or experiment that cannot be used
+    """
+    from .. import config
+    from ..equations.replay import replay_bench, table
+    from ..errors import InputError
+
+    if args.fault or args.health or args.unit:
+        raise InputError("--replay: takes fault, health and unit from the bench, accepted are overrides and --seed")
+    spec, plain = (config.replay_spec(config.compose(e, args.overrides)) for e in (args.experiment, "paper"))
+    for each in (spec, plain):
+        each["dataset"]["seed"] = args.seed
+    compared, without = replay_bench(args.replay, args.file, spec, plain, Path(args.experiment).parent)
+    print(table(compared, without))
+    print(f"written to {args.file}")
 
 
 def read_fault(words: list[str]):

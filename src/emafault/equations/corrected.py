@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..diagnosis.forms import FORMS
-from ..errors import InputError
+from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
 from .acquisition import advanced, delayed, full_range
@@ -68,23 +68,6 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
 
 
-def new_folder(bench: str | Path, folder: str | Path) -> Path:
-    """The folder, if corrected recordings of a bench may be written there.
-
-    Raises
-    ------
-    InputError : it is the bench's own, or holds files already
-    """
-    folder = Path(folder)
-    if (
-        folder.resolve() == Path(bench).resolve()
-        or (folder.exists() and not folder.is_dir())
-        or (folder.is_dir() and any(folder.iterdir()))
-    ):
-        raise InputError(f"--corrected: '{folder}' holds files already, accepted is a new folder")
-    return folder
-
-
 def write_corrected(
     found: Diagnosed, recordings: Mapping[str, Recording], bench: str | Path, folder: str | Path
 ) -> list[str]:
@@ -94,7 +77,7 @@ def write_corrected(
     ------
     InputError : the folder is the bench's own, or holds files already
     """
-    folder = new_folder(bench, folder)
+    folder = new_folder(bench, folder, "--corrected")
     out, undone = corrected(found, recordings)
     for name, recording in out.items():
         write_recording(folder / name, recording)

@@ -23,7 +23,7 @@ from ..effects import EFFECTS
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
-from . import telling
+from . import carried, telling
 from .held_out import HeldOut, held_to_account
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
@@ -37,8 +37,6 @@ from .terms import TERMS
 SCHEMA = "2.0"
 CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
-TOLD = 3.0  # standard deviations from nominal at which a controller's gain is told as different
-TELLING = 0.02  # of a gain: smaller differences are not worth telling
 
 
 @dataclass(frozen=True)
@@ -196,7 +194,8 @@ def _diagnosed(
         for n, p in entry.get("parameters", {}).items()
     ]
     before = _simulator(bench, before_point, ())
-    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if fitted else before}
+    found_any = fitted or reading.forms  # what is described changes the unit as well as an effect does
+    verdict["simulator"] = {"before": before, "after": _simulator(bench, after_values, fitted) if found_any else before}
     if held_out is not None:
         verdict["held_out"] = {e: round(r, 3) for e, r in held_out.ratios.items()}
     verdict["next_experiment"] = []
@@ -328,9 +327,11 @@ def _discovered(
             found = curve(bench.machine, described[form], blocks, bench.carried, values)
             entry = telling.told(described[form], linear, machine.actuator)
             entry["curve"] = telling.picture(described[form], found, machine.actuator)
+            entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
         else:
             units = {p.name: p.units for p in unit.parameters}
             entry = telling.told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+            entry["term"] = carried.of_chain(form, linear)
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,

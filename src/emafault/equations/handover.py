@@ -1,7 +1,12 @@
-"""Handing over the fix: the verdict's effects and the unit's own values as an experiment that the workflow runs."""
+"""Handing over the fix: effects, what was described and the unit's own values as an experiment that can be run."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from .carried import entries, left_out
+from .telling import differing_gains
+
+PACKAGE = "# @package _global_"  # where an experiment's keys go
 
 
 def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[str, float]], name: str) -> str:
@@ -16,18 +21,22 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
 
     rounded = {e: {p: float(f"{v:.8g}") for p, v in values.items()} for e, values in effects.items()}
     named = sorted({e for e in verdict["which"][0]["effects"] if e != "unknown"})
-    what = f"{_in_words(named)} and its unit's tolerances" if named else "its unit's tolerances alone"
-    body = OmegaConf.to_yaml(
-        OmegaConf.create(
-            {
-                "name": name,
-                "question": f"How well is the actuator of bench {verdict['bench']} identified with {what} simulated?",
-                "effects": rounded,
-            }
-        )
-    )
+    unlisted, gains = entries(verdict), differing_gains(verdict)
+    words = [*named, *(["what no catalogue lists"] if unlisted else []), "its unit's tolerances"]
+    what = _in_words(words) if len(words) > 1 else f"{words[0]} alone"
+    content: dict[str, Any] = {
+        "name": name,
+        "question": f"How well is the actuator of bench {verdict['bench']} identified with {what} simulated?",
+        "effects": rounded,
+    }
+    if gains:
+        content["actuator"] = {gain: float(f"{g['value']:.8g}") for gain, g in gains.items()}
+    if unlisted:
+        content["unlisted"] = unlisted
+    body = OmegaConf.to_yaml(OmegaConf.create(content))
+    missing = "".join(f"# not simulated: {sentence}\n" for sentence in left_out(verdict))
     head = (
-        "# @package _global_\n"
+        f"{PACKAGE}\n"
         f"# from the diagnosis of {verdict['bench']}: verdict {verdict['verdict']}, digest {verdict['digest']}\n"
         "defaults:\n"
         "  - override /reconstruction: [weighted, weighted_floating]\n"
@@ -35,7 +44,7 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
         "  - override /load: none\n"
         "  - override /magnet: constant\n"
     )
-    return head + body
+    return head + missing + body
 
 
 def _in_words(effects: Sequence[str]) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from ..faults import FAULT_NAMES
 from ..reporting.page import Page
 from ..reporting.retrained import MARKS
-from .diagnose import TELLING, TOLD
 from .electrical import NAMES
 from .quality import CHANNELS
+from .telling import differing_gains
 from .terms import TERMS
 
 ROWS = 12  # recordings in the picture of their quality
@@ -44,15 +44,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
         )
     out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
-    left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
-    for name, g in verdict["controller"].items():
-        if left and name != "position_gain":
-            continue  # what nothing describes may be a gain's doing, or take its place
-        apart = abs(g["value"] - g["nominal"])
-        sd = (g["high"] - g["low"]) / 3.29
-        if apart > TOLD * sd and apart > TELLING * g["nominal"]:
-            words = name.replace("_", " ")
-            out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
+    for name, g in differing_gains(verdict).items():
+        words = name.replace("_", " ")
+        out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
     signal = verdict["shrinks"]["signal"]
     if signal and signal["closed"] is not None:
         share = 100 * min(signal["closed"], 1.0)

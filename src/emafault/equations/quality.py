@@ -17,6 +17,8 @@ CHANNELS = {
     "bus_voltage": ("bus", "bus voltage", "V"),
     "output_position": ("position", "output position", "rad"),
 }
+#: words for a channel -> its place in a configuration
+PLACES = {"current": "current", "voltage": "voltage", "bus voltage": "bus_voltage", "output position": "output"}
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
 HELD = 3  # samples equal to the one before, which a channel with noise never shows
@@ -121,10 +123,12 @@ def _repeated(x: np.ndarray) -> float:
 def _entry(
     form: str, equation: str, words: str, parameter: str, value: float, units: str, text: str, names: Sequence[str]
 ) -> dict[str, Any]:
+    # how large spikes are is not told
+    term = None if form == "spikes" else {"place": PLACES[words], "form": form, parameter: float(f"{value:.8g}")}
     sentence = "In the measuring chain " + text.format(words, value, units, 100.0 * value) + "."
     return {
         "unit": f"~{form}", "equation": equation, "along": "time", "form": form, "probability": CERTAIN, "closed": None,
         "another_form_of": None,
         "parameters": {parameter: {"value": value, "low": value, "high": value, "units": units}},
-        "recordings": list(names), "sentence": sentence,
+        "recordings": list(names), "sentence": sentence, "term": term,
     }  # fmt: skip

@@ -7,12 +7,12 @@ from typing import Any
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
-from ..io.bench import Bench, read_bench
+from ..io.bench import Bench, new_folder, read_bench
 from ..io.split import split_bench
 from ..paths import results_folder
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, file_name
-from .corrected import new_folder, write_corrected
+from .corrected import write_corrected
 from .diagnose import Diagnosed, diagnose
 from .handover import experiment_text
 from .page import draw, finding
@@ -45,7 +45,7 @@ def diagnose_folder(
     InputError : recordings or effects that cannot be used, or results that cannot be written
     """
     if corrected is not None:  # refused before the work, not after it
-        new_folder(path, corrected)
+        new_folder(path, corrected, "--corrected")
     bench, found = diagnosed(path, spec, exclude)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
     verdict = found.verdict

@@ -14,6 +14,8 @@ from .machine import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
+APART = 3.0  # standard deviations from nominal at which a controller's gain is told as different
+TELLING = 0.02  # of a gain: smaller differences are not worth telling
 WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
 
@@ -87,6 +89,19 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
         "form": _word(form), "parameters": parameters,
         "sentence": _sentence(form, where, what, {n: (p["value"], p["units"]) for n, p in parameters.items()}, along),
     }  # fmt: skip
+
+
+def differing_gains(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Gains of the controller, as a verdict has them, that are told as different from the nominal ones."""
+    left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
+    out = {}
+    for name, g in verdict["controller"].items():
+        if left and name != "position_gain":
+            continue  # what nothing describes may be a gain's doing, or take its place
+        apart, sd = abs(g["value"] - g["nominal"]), (g["high"] - g["low"]) / (2.0 * Z)
+        if apart > APART * sd and apart > TELLING * g["nominal"]:
+            out[name] = g
+    return out
 
 
 def told_of_chain(

@@ -92,6 +92,23 @@ def _same(one: Recording, other: Recording) -> bool:
     return len(one.time) == len(other.time) and np.array_equal(one.phase_voltage, other.phase_voltage)
 
 
+def new_folder(bench: str | Path, folder: str | Path, option: str) -> Path:
+    """The folder, if recordings made of a bench's may be written there; ``option`` is the word that names it.
+
+    Raises
+    ------
+    InputError : it is the bench's own, or holds files already
+    """
+    folder = Path(folder)
+    if (
+        folder.resolve() == Path(bench).resolve()
+        or (folder.exists() and not folder.is_dir())
+        or (folder.is_dir() and any(folder.iterdir()))
+    ):
+        raise InputError(f"{option}: '{folder}' holds files already, accepted is a new folder")
+    return folder
+
+
 # --- what these recordings cannot tell -------------------------------------------------------------------------------
 
 

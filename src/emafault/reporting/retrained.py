@@ -1,4 +1,4 @@
-"""The section of the report that shows what retraining with the named effect has brought."""
+"""The section of the report that shows what retraining with what a diagnosis found has brought."""
 
 import html
 import json
@@ -30,14 +30,14 @@ def section_of(found: Mapping[str, Any]) -> str:
     )
     times = before["rms"] / max(after["rms"], 1e-12)
     text = (
-        "Two networks were trained for this bench, on simulations of its unit without and with the named effects. On "
+        "Two networks were trained for this bench, on simulations of its unit without and with what was found. On "
         f"{len(found['recordings'])} recordings, against {against}, the error is {before['rms']:.3g} % of range "
         f"without and {after['rms']:.3g} % with them: {times:.2g} times smaller."
     )
     names = list(before["components"])
     head = "".join(f"<th>{html.escape(n)}</th>" for n in ["rms error, % of range", "all", *names])
     rows = ""
-    for label, entry in (("without the effects", before), ("with the effects", after)):
+    for label, entry in (("without what was found", before), ("with it", after)):
         cells = [f"{entry['rms']:.3g}", *(f"{entry['components'][n]:.3g}" for n in names)]
         rows += f"<tr><td>{label}</td>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
     table = f'<div class="scroll"><table><tr>{head}</tr>{rows}</table></div>'

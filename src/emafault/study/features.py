@@ -169,6 +169,7 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
 
     from ..actuator.commands import command_positions
     from ..actuator.simulate import simulate
+    from ..actuator.unlisted import in_machine
     from ..reconstruction.bounds import cramer_rao_bound
 
     part = spec["dataset"]
@@ -187,7 +188,9 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
             for parts in found.values():
                 parts.append(np.full((len(runs[start : start + BLOCK]), 6), np.nan))
             continue
-        clean = simulate(runs[start : start + BLOCK], command, recording["duration"], recording["interval"])
+        some = runs[start : start + BLOCK]
+        terms = in_machine(part.get("unlisted", ()), len(some), part["seed"], start)
+        clean = simulate(some, command, recording["duration"], recording["interval"], terms=terms)
         for name, parts in found.items():
             choice = {"discard": spec["discard"], "floating": name == "floating"}
             bound = cramer_rao_bound(

@@ -1,7 +1,7 @@
-"""Retraining with what a diagnosis found: two networks for one bench, without and with the named effects simulated.
+"""Retraining with what a diagnosis found: two networks for one bench, without and with that simulated.
 
 Both learn from simulations of the bench's own commands, lengths and intervals, by the unit that the diagnosis fitted
-without and with the effects, and identify the bench's recordings.
+without and with the listed effects and what it describes, and identify the bench's recordings.
 """
 
 from collections.abc import Mapping
@@ -12,9 +12,8 @@ import numpy as np
 
 from ..actuator.commands import resample
 from ..actuator.parameters import ActuatorParameters
-from ..actuator.sensors import SensorNoise, measure
-from ..actuator.simulate import simulate
-from ..dataset import as_batch, sample_runs
+from ..dataset import as_batch, sample_runs, simulate_and_measure
+from ..equations.carried import entries
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.identifier import fit_identifier
@@ -74,7 +73,8 @@ def retrain_network(bench: str | Path, folder: str | Path, spec: Mapping[str, An
     width = width_of(spec["faults"])
     errors: dict[str, Any] = {}
     for kind, effects in verdict["simulator"].items():
-        features, faults = simulated_features(recordings, effects, spec, method, settings, f"simulate {kind}")
+        simulated = {"effects": effects, "unlisted": entries(verdict) if kind == "after" else []}
+        features, faults = simulated_features(recordings, simulated, spec, method, settings, f"simulate {kind}")
         estimates = []
         for seed in progress(range(spec["seeds"]), f"train {kind}", spec["seeds"]):
             fit = fit_identifier(
@@ -97,17 +97,20 @@ def retrain_network(bench: str | Path, folder: str | Path, spec: Mapping[str, An
 
 def simulated_features(
     recordings: Mapping[str, Recording],
-    effects: Mapping[str, Mapping[str, float]],
+    simulated: Mapping[str, Any],
     spec: Mapping[str, Any],
     method: str,
     settings: Mapping[str, Any],
     label: str,
 ) -> tuple[Features, np.ndarray]:
-    """Features and fault vectors of runs that replay the bench's recordings in turn under sampled faults."""
-    dataset = dict(spec["dataset"]) | {"effects": effects}
+    """Features and fault vectors of runs that replay the bench's recordings in turn under sampled faults.
+
+    ``simulated`` : ``effects`` and ``unlisted`` as a configuration has them
+    """
+    dataset = dict(spec["dataset"]) | dict(simulated)
     dataset["recording"] = dict(dataset["recording"]) | {"theta_0": {"low": 0.0, "high": 2.0 * np.pi}}
     sample = sample_runs(dataset)
-    noise, actuator = SensorNoise(**dataset["sensors"]), ActuatorParameters(**dataset["actuator"])
+    actuator = ActuatorParameters(**dataset["actuator"])
     parts, faults = [], []
     count = len(recordings)
     for m, recording in enumerate(progress(recordings.values(), label, count)):
@@ -118,9 +121,8 @@ def simulated_features(
         for start in range(0, len(rows), BLOCK):
             chosen = rows[start : start + BLOCK]
             runs = sample.records(slice(int(chosen[0]), int(chosen[-1]) + 1, count))
-            signals = measure(
-                simulate(runs, command, duration, recording.interval), runs, noise, dataset["seed"], int(chosen[0])
-            )
+            timing = duration, recording.interval
+            signals = simulate_and_measure(dataset, runs, command, *timing, first_run=int(chosen[0]))
             if recording.phase_current_end is None:
                 del signals["phase_current_end"]
             try:

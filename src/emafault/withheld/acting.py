@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..actuator.unlisted import TABLE_STEP, term
+from ..actuator.unlisted import SOURCES, TABLE_STEP, term
 from .disturbance import Acting, Register, letter
 
 ACTING = Register()
@@ -12,9 +12,9 @@ TWO_PI = 2.0 * np.pi
 SPARE = 0.05  # s that a table is longer than its recording
 
 
-def _torque(shape: str, **parameters: float):
-    """What gives one and the same torque in every recording."""
-    row = term("torque", shape, **parameters)
+def _torque(shape: str, place: str = "torque", **parameters: float):
+    """What gives one and the same torque, or one against the motion, in every recording."""
+    row = term(place, shape, **parameters)
 
     def terms(_, __) -> tuple[Sequence[np.ndarray], None]:
         return [row], None
@@ -63,7 +63,7 @@ def torque_step(size: float, rng: np.random.Generator) -> Acting:
 def fan_torque(size: float, rng: np.random.Generator) -> Acting:
     """A drag that goes with the square of the speed, as of a fan."""
     amplitude = 0.03 * size
-    terms = _torque("speed", amplitude=amplitude, exponent=2.0)
+    terms = _torque("power", "drag", at_100_rad_s=amplitude, exponent=2.0)
     return Acting(("torque",), {"at_100_rad_s": (amplitude, "N m")}, terms=terms)
 
 
@@ -80,7 +80,8 @@ def grease(size: float, rng: np.random.Generator) -> Acting:
     """A drag that builds up while the rotor turns."""
     gain, constant = 0.03 * size, float(rng.uniform(0.05, 0.3))
     found = {"gain": (gain, "N m"), "time_constant": (constant, "s")}
-    return Acting(("torque",), found, terms=_torque("memory", gain=gain, time_constant=constant))
+    terms = _torque("memory", "drag", gain=gain, time_constant=constant, source=SOURCES.index("speed"))
+    return Acting(("torque",), found, terms=terms)
 
 
 @ACTING.inside("bump", "rotor_angle")

@@ -1,0 +1,81 @@
+"""What may act that no catalogue lists: places, forms and their parameters, as a configuration names them.
+
+An entry of ``unlisted`` in a configuration has a place, a form and the form's parameters. In the machine it acts in the
+simulated physics (``unlisted.py``), in the measuring chain on what is recorded (``chain.py``).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+PHASES = ("a", "b", "c")
+#: place in the machine, in the order of the simulations' terms -> unit of what a form adds there: to the driving
+#: torque, to a phase's back-EMF coefficient as a share of it, to its resistance, to the torque against the motion, to
+#: the electrical torque and to the rotor's inertia as a share of each
+MACHINE = {
+    "torque": "N m", **{f"emf_{j}": "1" for j in PHASES}, **{f"resistance_{j}": "ohm" for j in PHASES}, "drag": "N m",
+    "torque_constant": "1", "inertia": "1",
+}  # fmt: skip
+#: channel of the measuring chain -> its unit; without a phase, that of all three
+CHANNELS = {
+    "voltage": "V", **{f"voltage_{j}": "V" for j in PHASES}, "current": "A", **{f"current_{j}": "A" for j in PHASES},
+    "speed": "rad/s", "angle": "rad", "output": "rad", "bus_voltage": "V",
+}  # fmt: skip
+#: what multiplies a signal in the measuring chain -> its unit: a channel's relative gain, a voltage in proportion to
+#: speed times the shape of the back-EMF, an output position in proportion to the direction or the acceleration
+FACTORS = {
+    "speed_scale": "1", **{f"current_gain_{j}": "1" for j in PHASES},
+    **{f"voltage_per_speed_{j}": "V s/rad" for j in PHASES}, "output_play": "rad", "output_twist": "rad s2",
+}  # fmt: skip
+PLACES = MACHINE | CHANNELS | FACTORS
+#: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
+#: of the magnitudes), the angle turned since the start over the gear ratio, time, the soak temperature
+COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
+#: of a memory: (current / 2)^2 (A2), magnitude of the speed over 100 rad/s, one from the start of the recording
+SOURCES = ("loss", "speed", "start")
+KNOTS = 6  # of a function, equally spaced
+MOST_TERMS = 8  # in the machine
+
+ANY, _SMALLEST = (-1e6, 1e6), 1e-6
+#: parameter -> lowest and highest value, unit; without one it has the place's
+PARAMETERS: dict[str, tuple[float, float, str]] = {
+    "amplitude": (*ANY, ""), "jump": (*ANY, ""), "at_100_rad_s": (*ANY, ""), "depth": (*ANY, ""), "gain": (*ANY, ""),
+    "at_end": (*ANY, ""), "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
+    "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
+    "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
+    "time_constant": (1e-4, 1e6, "s"), "lag": (-1.0, 1.0, "recording intervals"),
+    "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
+}  # fmt: skip
+SHARE = 0.9  # largest, of what a form adds as a share
+#: form -> its parameters; SI. What they mean: ``unlisted.SHAPES`` and ``chain``
+SHAPES = {
+    "order": ("amplitude", "order", "phase"), "frequency": ("amplitude", "frequency", "phase"),
+    "step_change": ("jump", "time"), "power": ("at_100_rad_s", "exponent"), "bump": ("depth", "centre", "width"),
+    "memory": ("gain", "time_constant", "source"), "function": ("along", "from", "to", "values"),
+}  # fmt: skip
+OF_CHANNELS = {
+    "drift": ("at_end",), "lag": ("lag",), "sensor_curve": ("bend",), "crosstalk": ("source", "gain"),
+    "spikes": ("share", "level"), "held": ("share",), "clipping": ("level",), "adc_step": ("step",),
+}  # fmt: skip
+FORMS = SHAPES | OF_CHANNELS
+#: parameters that may be left out: the phase of a wave in time is then another one in each run
+OPTIONAL = {"frequency": ("phase",)}
+#: an entry's values of single recordings, by name: they go before its own where that recording is replayed
+EACH = "recordings"
+
+
+def forms_at(place: str) -> list[str]:
+    """Forms that a place may have."""
+    if place not in CHANNELS:
+        return list(SHAPES)
+    quantity, _, phase = place.partition("_")
+    phased = quantity in ("voltage", "current")
+    only = {
+        "crosstalk": place.startswith("current_"), "sensor_curve": phased, "drift": phased and phase in PHASES,
+    }  # fmt: skip
+    return [*SHAPES, *(form for form in OF_CHANNELS if only.get(form, True))]
+
+
+def of_recording(entry: Mapping[str, Any], recording: str) -> dict[str, Any]:
+    """An entry with the values that a recording has of its own, by the recording's name."""
+    own = entry.get(EACH, {}).get(recording, {})
+    return {key: value for key, value in entry.items() if key != EACH} | dict(own)

@@ -1,0 +1,114 @@
+"""What a diagnosis describes, as entries of ``unlisted`` in a configuration, which both simulators have.
+
+What cannot be an entry is None: an undescribed remainder, spikes, whose size is not told, and a resistance of the bus
+that changes.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..actuator.grammar import EACH, PHASES
+from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.described import Described
+from ..diagnosis.forms import FORMS, function, memory
+from .telling import subject
+
+Entry = dict[str, Any]
+#: equation -> place of what multiplies each of its drivers
+DRIVERS: dict[str, tuple[str, ...]] = {
+    **{f"electrical_{j}": (f"voltage_{j}", f"resistance_{j}", f"voltage_per_speed_{j}") for j in PHASES},
+    "torque": ("torque", "drag", "torque_constant", "inertia"),
+    "sensor_speed": ("speed", "speed_scale"),
+    "sensor_current": ("current", "current_gain_a", "current_gain_b"),
+    "position": ("output", "output_play", "output_twist"),
+    "bus": ("bus_voltage",),
+}  # fmt: skip
+
+
+def of_form(
+    form: Described,
+    linear: Mapping[str, tuple[float, float]],
+    recordings: Sequence[str],
+    actuator: ActuatorParameters,
+) -> Entry | None:
+    """Entry of a described form.
+
+    Parameters
+    ----------
+    linear : coefficients and their standard deviations by name
+    recordings : names, of those that have coefficients of their own
+    """
+    if form.channel:
+        place = form.channel.replace("k_", "emf_")
+    else:
+        places = DRIVERS.get(form.equation, ())
+        if form.driver >= len(places):
+            return None
+        place = places[form.driver]
+    factor = subject(form, actuator)[2]
+    module = FORMS[form.word]
+
+    def told(recording: str) -> dict[str, float]:
+        found = module.told(factor * np.array([linear[n][0] for n in form.names(recording) if n in linear]))
+        if "phase" in found:  # a wave is told by where it is highest
+            found["phase"] = -found["phase"]
+        return found
+
+    entry: Entry = {"place": place, "form": form.word}
+    shape = dict(form.values)
+    if form.word == "function":
+        entry["along"] = tuple(function.COORDINATES)[int(shape.pop("coordinate"))]
+        values = told(recordings[0])
+        return _rounded(entry | shape | {"values": [values[n] for n in function.VALUES]})
+    if form.word == "memory":
+        entry["source"] = memory.SOURCES[int(shape.pop("source"))]
+    entry |= shape
+    if not module.EACH:
+        return _rounded(entry | told(recordings[0]))
+    own = {}
+    for name in recordings:
+        pair = factor * np.array([linear[n][0] if n in linear else 0.0 for n in form.names(name)])
+        own[name] = {"amplitude": float(np.hypot(*pair)), "phase": -float(np.arctan2(pair[1], pair[0]))}
+    amplitude = float(np.sqrt(np.mean([v["amplitude"] ** 2 for v in own.values()])))
+    return _rounded(entry | {"amplitude": amplitude, EACH: own})
+
+
+def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | None:
+    """Entry of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve."""
+    kind, _, channel = unit.removeprefix("~").partition("_")
+    values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
+    if kind == "lag":
+        lag = sum(-v if name.endswith("_early") else v for name, v in values.items())
+        return _rounded({"place": channel, "form": "lag", "lag": lag})
+    if kind == "crosstalk":
+        ((pair, gain),) = values.items()
+        return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})
+    if kind == "curve":
+        ((place, bend),) = values.items()
+        return _rounded({"place": place, "form": "sensor_curve", "bend": bend})
+    if kind == "drift":
+        own = {name.partition("@")[2]: {"at_end": v} for name, v in values.items()}
+        mean = float(np.mean([v["at_end"] for v in own.values()]))
+        return _rounded({"place": channel, "form": "drift", "at_end": mean, EACH: own})
+    return None
+
+
+def entries(verdict: Mapping[str, Any]) -> list[Entry]:
+    """What a verdict describes and the simulators carry."""
+    return [d["term"] for d in verdict["discovered"] if d.get("term")]
+
+
+def left_out(verdict: Mapping[str, Any]) -> list[str]:
+    """Sentences of what a verdict describes and the simulators do not carry."""
+    return [str(d["sentence"]) for d in verdict["discovered"] if not d.get("term")]
+
+
+def _rounded(value: Any) -> Any:
+    """The same with numbers of eight digits."""
+    if isinstance(value, Mapping):
+        return {key: _rounded(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [_rounded(v) for v in value]
+    return float(f"{value:.8g}") if isinstance(value, float) else value

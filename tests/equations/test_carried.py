@@ -1,0 +1,154 @@
+"""What is described becomes an entry that simulators have: of the same values, where the form's driver acts."""
+
+import numpy as np
+import pytest
+
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.simulate import time_axis
+from emafault.actuator.unlisted import followed, row_of
+from emafault.dataset import simulate_and_measure
+from emafault.diagnosis.described import Described, WithForms
+from emafault.diagnosis.forms import FORMS
+from emafault.equations.carried import DRIVERS, of_chain, of_form
+from emafault.equations.handover import experiment_text
+from emafault.io.recording import Recording
+from emafault.schema import check_unlisted
+
+from .conftest import ACTUATOR, COMMANDS, SPEC, machine_of
+
+SHAPES = {
+    "order": {"order": 2.4}, "frequency": {"frequency": 40.0}, "bump": {"centre": 6.0, "width": 0.4},
+    "step_change": {"time": 0.30003}, "power": {"exponent": 2.0}, "memory": {"source": 0.0, "time_constant": 0.1},
+    "function": {"coordinate": 0.0, "from": -100.0, "to": 150.0},
+}  # fmt: skip
+
+
+def described(word, equation="torque", driver=0, shape=None, channel=""):
+    """A form with a shape that is known exactly."""
+    rows = tuple((n, v, 0.0, "1") for n, v in (shape or SHAPES[word]).items())
+    return Described(f"~{word}", word, equation, driver, rows, 1.0, 1.0, channel=channel)
+
+
+def coefficients(form, recordings):
+    """Coefficients of a form, another for each, as a fit gives them."""
+    names = dict.fromkeys(n for r in recordings for n in form.names(r))
+    return {n: (0.3 + 0.2 * k, 0.01) for k, n in enumerate(names)}
+
+
+@pytest.mark.parametrize("word", FORMS)
+def test_an_entry_has_the_values_of_the_form(word):
+    t = np.linspace(0.0, 0.6, 6001)
+    theta, w = 0.4 + 100.0 * t**2, 200.0 * t
+    along = {
+        "time": t,
+        "angle": theta,
+        "rotor_angle": np.mod(theta, 2 * np.pi),
+        "rotor_speed": w,
+        "current": 1.0 + 3.0 * t,
+    }
+    form = described(word)
+    linear = coefficients(form, ["a", "b"])
+    entry = of_form(form, linear, ["a", "b"], ACTUATOR)
+    check_unlisted([entry])
+    for name in ("a", "b"):
+        wanted = np.array([linear[n][0] for n in form.names(name)]) @ FORMS[word].columns(along, form.values)
+        own = entry | entry.get("recordings", {}).get(name, {})
+        row = row_of({key: value for key, value in own.items() if key != "recordings"})
+        got = followed(row, t, theta, w, along["current"], 0.0 * t, 20.0)
+        np.testing.assert_allclose(got, wanted, atol=2e-3 * np.abs(wanted).max())
+
+
+def recorded(unlisted):
+    """A recording of the nominal unit with these entries, its noise a tenth of the usual."""
+    runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
+    position = command_positions("sine", COMMANDS["sine"], 0.8, ACTUATOR.control_period)
+    sensors = {name: 0.1 * value for name, value in SPEC["sensors"].items()}
+    spec = {"sensors": sensors, "seed": 1, "unlisted": unlisted}
+    out = simulate_and_measure(spec, runs, position, 0.8, 2e-4, recording="a.nc")
+    ambient = float(out.pop("ambient_temperature")[0])
+    return Recording(
+        time=time_axis(0.8, 2e-4), ambient_temperature=ambient, attributes={"health": "healthy"},
+        **{k: v[0] for k, v in out.items()},
+    )  # fmt: skip
+
+
+def found(form, entry):
+    """Coefficient of a form, by least squares in its equation, with an entry simulated less that without."""
+    values = []
+    for unlisted in ([entry], []):
+        machine = WithForms(machine_of({"a.nc": recorded(unlisted)}), [form])
+        off = {n: p.off for n, p in machine.parameters.items()}
+        block = next(b for b in machine.blocks(off, "a.nc") if b.equation == (form.seen or form.equation))
+        (name,) = form.names("a.nc")
+        column = block.columns[name][block.usable]
+        values.append(-float(column @ block.residual[block.usable]) / float(column @ column))
+    return values[0] - values[1]
+
+
+#: of each driver a coefficient that is plain to see, in the units of the equation
+SIZES = {"electrical": (0.5, 0.3, 0.4), "torque": (0.01, 0.01, 0.01, 0.01), "sensor_speed": (2.0, 3.0)}
+SIZES |= {"sensor_current": (0.3, 0.1, 0.1), "position": (1e-4, 1e-4, 1e-4), "bus": (1.0,)}
+
+
+@pytest.mark.parametrize(
+    ("equation", "driver"), [(equation, d) for equation, places in DRIVERS.items() for d in range(len(places))]
+)
+def test_a_place_is_what_its_driver_multiplies(equation, driver):
+    size = SIZES[equation.partition("_")[0] if equation.startswith("electrical") else equation][driver]
+    form = described("step_change", equation, driver)
+    entry = of_form(form, {form.names("a.nc")[0]: (size, 0.0)}, ["a.nc"], ACTUATOR)
+    assert entry["place"] == DRIVERS[equation][driver]
+    assert found(form, entry) == pytest.approx(size, rel=0.1)
+
+
+def test_what_is_in_a_channel_or_a_coefficient_lies_there():
+    form = described("order", "sensor_angle", channel="angle")
+    assert of_form(form, coefficients(form, ["a"]), ["a"], ACTUATOR)["place"] == "angle"
+    form = described("bump", "electrical_b", 2, channel="k_b")
+    entry = of_form(form, {form.names("a")[0]: (-0.1, 0.01)}, ["a"], ACTUATOR)
+    assert entry == {"place": "emf_b", "form": "bump", "centre": 6.0, "width": 0.4, "depth": -0.1}
+    assert of_form(described("order", "bus", 1), {}, ["a"], ACTUATOR) is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "values", "wanted"),
+    [
+        ("~lag_voltage", {"lag.voltage_late": 0.4}, {"place": "voltage", "form": "lag", "lag": 0.4}),
+        ("~lag_output", {"lag.output_early": 0.4}, {"place": "output", "form": "lag", "lag": -0.4}),
+        (
+            "~crosstalk_current",
+            {"crosstalk.ab": 0.05},
+            {"place": "current_a", "form": "crosstalk", "source": "b", "gain": 0.05},
+        ),
+        ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
+        ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
+        (
+            "~drift_current_b",
+            {"drift_current.b@one.nc": 0.1, "drift_current.b@two.nc": 0.3},
+            {
+                "place": "current_b", "form": "drift", "at_end": 0.2,
+                "recordings": {"one.nc": {"at_end": 0.1}, "two.nc": {"at_end": 0.3}},
+            },
+        ),
+    ],
+)  # fmt: skip
+def test_faults_of_the_measuring_chain(unit, values, wanted):
+    entry = of_chain(unit, {n: (v, 0.01) for n, v in values.items()})
+    assert entry == wanted
+    check_unlisted([entry])
+
+
+def test_an_experiment_says_what_it_does_not_simulate():
+    gain = {"value": 80.0, "low": 79.0, "high": 81.0, "nominal": 100.0}
+    verdict = {
+        "bench": "mine", "verdict": "partly", "digest": "0", "which": [{"effects": ["cogging"]}],
+        "controller": {"position_gain": gain, "speed_gain": gain | {"nominal": 80.5}},
+        "discovered": [
+            {"equation": "bus", "form": "remainder", "sentence": "The bus equation leaves more."},
+            {"equation": "torque", "form": "order", "sentence": "A wave.", "term": {"place": "torque"}},
+        ],
+    }  # fmt: skip
+    text = experiment_text(verdict, {"cogging": {"a": 0.01}}, "mine")
+    assert "# not simulated: The bus equation leaves more.\n" in text and "A wave." not in text
+    assert "place: torque" in text and "position_gain: 80.0" in text and "speed_gain" not in text
