@@ -1,6 +1,7 @@
 """Raw logs with what goes wrong at a bench: what was simulated comes out, or a line that says what to do."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,44 +10,12 @@ import yaml
 from emafault.cli import main
 from emafault.errors import InputError
 from emafault.imports.mapping import complete
-from emafault.imports.run import imported
-from emafault.imports.signal import Signal, pulse_uncertainty
 from emafault.io.bench import read_bench
 from emafault.io.recording import read_recording
 
-from .measured import ACTUATOR, INTERVAL, NOISE, log, map_of, rested, simulated
-from .writers import WITHOUT_UNITS, WRITERS, channel, parquet
-
-ELECTRICAL = 2.0 * np.pi / ACTUATOR.pole_pairs
-
-
-def bring(folder, given, **logs):
-    """Import logs, written as Parquet, by a map."""
-    for name, written in logs.items():
-        parquet(folder / f"{name}.parquet", written)
-    return imported(complete(given, folder / "map.yaml"), ACTUATOR, NOISE["u"])
-
-
-def off(recording, truth, voltage=0.056, tail=0.0, current=0.0056, command=1e-9):
-    """Channels that are not those of the truth; the angle counts up to whole electrical turns.
-
-    ``voltage``, ``current`` and ``command``: what their errors may be, most of it noise; ``tail``: share of voltages
-    that may be further off
-    """
-    n = len(recording.time)
-    errors = {
-        "phase_current": (recording.phase_current - truth["phase_current"][:n], current),
-        "rotor_speed": (recording.rotor_speed - truth["rotor_speed"][:n], 0.33),
-        "output_position": (recording.output_position - truth["output_position"][:n], 1.1e-5),
-        "commanded_position": (recording.commanded_position - truth["commanded_position"][:n], command),
-    }
-    u = np.abs(recording.phase_voltage - truth["phase_voltage"][:n])
-    kept = np.sort(u, axis=None)[: int((1.0 - tail) * u.size)]
-    turn = recording.rotor_angle - truth["rotor_angle"][:n]
-    turn -= ELECTRICAL * np.round(np.median(turn) / ELECTRICAL)
-    wrong = [name for name, (error, most) in errors.items() if np.sqrt(np.mean(error**2)) > most]
-    wrong += ["phase_voltage"] if np.sqrt(np.mean(kept**2)) > voltage else []
-    return wrong + (["rotor_angle"] if np.sqrt(np.mean(turn**2)) > np.deg2rad(0.5) / ACTUATOR.pole_pairs else [])
+from .checks import ELECTRICAL, bring, off
+from .measured import ACTUATOR, log, map_of
+from .writers import WITHOUT_UNITS, WRITERS, channel
 
 
 @pytest.mark.parametrize("reference", ["star", "dc_minus", "virtual_star", "line_to_line", "duty"])
@@ -183,117 +152,32 @@ def test_names_that_go_round_are_put_right_once_one_order_is_stated(fine, truth,
     assert off(result.recordings["one.nc"], truth) == []
 
 
-REST = 0.06  # s, before the motion
-
-
-@pytest.mark.parametrize(
-    ("second", "skew", "drift"),
-    [(("angle", "speed", "out", "cmd"), 0.0371, 3e-4), (("ia", "ib", "ic"), -0.0122, 0.0)],
-)
-def test_a_second_clock_is_found(second, skew, drift, fine, truth, tmp_path):
-    step = 0.1 * INTERVAL
-    s = rested(fine, REST)
-    one, two = log(s), log(s)
-    one.channels = {n: v[max(0, -round(skew / step)) :] for n, v in one.channels.items() if n not in second}
-    two.channels = {n: v[max(0, round(skew / step)) :] for n, v in two.channels.items() if n in second}
-    # each counts from when it was started, one in seconds that are too short
-    one.time = step * np.arange(1, len(next(iter(one.channels.values()))) + 1)
-    two.time = step * np.arange(1, len(next(iter(two.channels.values()))) + 1) / (1.0 + drift) + 1e5
-    begin = REST - max(0.0, -skew)
-    given = map_of(loggers={"daq": {"samples": "means"}, "pod": {"samples": "means", "clock": "found"}})
-    given["recordings"][0] = {
-        "name": "one", "health": "unknown", "ambient": 24.0, "files": {"daq": "one.parquet", "pod": "two.parquet"},
-        "segment": [begin, begin + 0.49],
-    }  # fmt: skip
-    for spec in given["signals"].values():
-        if set(spec.get("channels", [spec.get("channel")])) <= set(second):
-            spec["logger"] = "pod"
-    result = bring(tmp_path, given, one=one, two=two)
-    (finding,) = (f for f in result.findings if "clock of pod" in f.what)
-    found = float(finding.taken.split()[0]), float(finding.taken.split()[-3])
-    assert found[0] == pytest.approx(1e3 * skew, abs=0.1) and found[1] == pytest.approx(1e6 * drift, abs=100.0)
-    # shared out anew over the intervals of the other clock, but right to a part of a sample
-    assert off(result.recordings["one.nc"], truth, current=0.1, command=1e-5) == []
-
-
-def test_instants_of_pulses_are_averaged_and_their_uncertainty_is_written(tmp_path):
-    step = 5e-7
-    s = simulated(step, duration=0.25)
-    kept = slice(1, None, 4)  # 500 kS/s, each the value at an instant
-    raw = log({name: values[kept] for name, values in s.items()}, "dc_minus", noisy=False)
-    result = bring(tmp_path, map_of("dc_minus", "instants"), log=raw)
-    recording = result.recordings["one.nc"]
-    coarse = simulated(INTERVAL, duration=0.25)
-    begin = round((raw.time[0] % INTERVAL) / step)
-    moved = {n: np.roll(v, -begin, axis=0) for n, v in s.items()}
-    wanted = moved["phase_voltage"][: len(recording.time) * 400].reshape(-1, 400, 3).mean(axis=1)
-    error = recording.phase_voltage - wanted
-    noise = recording.known["phase_voltage"]["noise"]
-    assert 0.3 < np.sqrt(np.mean(error**2)) / noise < 1.5 and noise > NOISE["u"]
-    assert any("a 200 us mean is uncertain by" in text for text in result.lost["one"])
-    assert recording.phase_current_end is not None and len(coarse["time"]) >= len(recording.time)
-
-
-def test_what_was_not_measured_is_told(fine, truth, tmp_path):
-    given = map_of()
-    given["signals"]["phase_current"]["channels"][1] = None
-    for name in ("bus_voltage", "rotor_speed"):
-        del given["signals"][name]
-    result = bring(tmp_path, given, log=log(fine).change(ic=np.negative))
-    recording = result.recordings["one.nc"]
-    # the phase that was not measured has the noise of two, the speed that of the angle
-    errors = np.sqrt(np.mean((recording.phase_current - truth["phase_current"]) ** 2, axis=0))
-    assert errors == pytest.approx([0.005, 0.0071, 0.005], rel=0.1)
-    assert np.sqrt(np.mean((recording.rotor_speed - truth["rotor_speed"]) ** 2)) < 2e-4 / INTERVAL
-    assert recording.bus_voltage is None and recording.known["phase_current"] == {"derived": "b"}
-    told = " ".join(result.lost["one"])
-    assert all(text in told for text in ("third current", "no end currents", "no bus voltage", "no rotor_speed"))
-
-
-@pytest.mark.parametrize("wiring", ["abc", "cba"])
-def test_hall_sensors_do_for_an_encoder(wiring, fine, truth, tmp_path):
-    raw = log(fine)
-    x = ACTUATOR.pole_pairs * fine["rotor_angle"] + 0.4
-    halls = {f"h{'abc'[k]}": (np.sin(x - 2.0 * np.pi / 3.0 * k) > 0.0).astype(float) for k in range(3)}
-    raw.channels |= halls
-    raw.units |= dict.fromkeys(halls, "1")
-    given = map_of()
-    given["signals"]["rotor_angle"] = {"hall": [f"h{letter}" for letter in wiring]}
+def test_counts_wraps_units_and_stamps_are_as_the_map_says(fine, truth, tmp_path):
+    step = fine["time"][1] - fine["time"][0]
+    raw = log(fine).change(
+        angle=lambda v: np.floor(v * 40_000 / (2.0 * np.pi)) % 65_536, speed=lambda v: v * 30.0 / np.pi,
+        out=lambda v: np.rad2deg(v) + 1.25, cmd=lambda v: np.rad2deg(v) + 1.25, ua=lambda v: v / 50.0,
+        ub=lambda v: v / 50.0, uc=lambda v: v / 50.0, ia=lambda v: 1e3 * v, ib=lambda v: 1e3 * v, ic=lambda v: 1e3 * v,
+    )  # fmt: skip
+    raw.units |= {"angle": "1"} | dict.fromkeys(("ia", "ib", "ic"), "mA") | dict.fromkeys(("out", "cmd"), "deg")
+    given = map_of(interval="200 us", loggers={"daq": {"samples": "means", "stamp": "start"}})
+    signals = given["signals"]
+    signals["rotor_angle"] |= {"counts_per_turn": 40_000, "wraps_at": 65_536}
+    signals["phase_voltage"] |= {"scale": 50}
+    signals["rotor_speed"] |= {"unit": "rpm"}
+    for name in ("output_position", "commanded_position"):
+        signals[name] |= {"offset": 1.25}
+    # angles and positions are instants, which have no interval to be stamped in: these are a step late
+    raw.time = raw.time - step
+    for name in ("angle", "out", "cmd"):
+        raw.channels[name] = np.append(raw.channels[name][:1], raw.channels[name][:-1])
     result = bring(tmp_path, given, log=raw)
-    recording = result.recordings["one.nc"]
-    assert set(off(recording, truth)) <= {"rotor_angle"} and recording.known["rotor_angle"] == {"source": "hall"}
-    turn = recording.rotor_angle - truth["rotor_angle"]
-    turn = ACTUATOR.pole_pairs * (turn - ELECTRICAL * np.round(np.median(turn) / ELECTRICAL))
-    moving = np.abs(truth["rotor_speed"]) > 50.0
-    assert np.sqrt(np.mean(turn[moving] ** 2)) < np.deg2rad(3.0)
-    assert any("hall edges" in text for text in result.lost["one"])
+    assert off(result.recordings["one.nc"], truth, command=1e-5) == []
 
 
-def test_pulse_uncertainty_is_that_of_edges_between_samples():
-    # 48 V, 20 kHz at 100 kS/s and at 10 MS/s; and against pulses that keep step with the samples
-    assert pulse_uncertainty(48.0, 20e3, 1e-5) == pytest.approx(3.9, abs=0.05)
-    assert pulse_uncertainty(48.0, 20e3, 1e-7) == pytest.approx(0.039, abs=0.001)
-    rng = np.random.default_rng(3)
-    rise, width = rng.uniform(0.0, 5e-5, 2000), rng.uniform(1e-5, 4e-5, 2000)
-    time = 1e-5 * np.arange(21)
-    means = []
-    for begin, long in zip(rise, width):
-        pulses = 48.0 * (np.mod(time - begin, 5e-5) < long)
-        means.append(Signal(time, pulses, False, "", "").means(np.array([0.0, 2e-4]))[0] - 48.0 * long / 5e-5)
-    assert np.std(means) == pytest.approx(pulse_uncertainty(48.0, 20e3, 1e-5), rel=0.05)
-
-
-def test_means_are_exact_for_any_edges():
-    rng = np.random.default_rng(1)
-    time = np.sort(rng.uniform(0.0, 1.0, 40))
-    values = rng.standard_normal(40)
-    edges = np.sort(rng.uniform(time[0], time[-1], 9))
-    fine_time = np.linspace(edges[0], edges[-1], 400_001)
-    line = np.interp(fine_time, time, values)
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(fine_time))])
-    expected = np.diff(np.interp(edges, fine_time, total)) / np.diff(edges)
-    assert Signal(time, values, False, "", "").means(edges) == pytest.approx(expected, abs=1e-7)
-    uniform = 0.1 * np.arange(1, 41)
-    stepped = Signal(uniform, values, True, "", "")
-    assert stepped.means(np.array([0.0, 0.1, 0.3])) == pytest.approx([values[0], values[1:3].mean()])
-    assert stepped.means(np.array([0.05, 0.15])) == pytest.approx([0.5 * (values[0] + values[1])])
+def test_the_example_of_the_documentation_fits_the_schema(tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text()
+    example = yaml.safe_load(text.split("```yaml")[1].split("```")[0])
+    found = complete(example, tmp_path / "bench.yaml")
+    assert found["recordings"][0]["files"] == {"scope": str(tmp_path / "cold.csv"), "daq": str(tmp_path / "cold.tdms")}
+    assert found["loggers"]["scope"] == {"samples": "instants", "stamp": "end", "clock": "same"}

@@ -6,12 +6,12 @@ from pathlib import Path
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("files", nargs="*", metavar="FILE", help="files to list, or to guess a map for")
     parser.add_argument(
         "overrides",
         nargs="*",
-        metavar="OVERRIDE",
-        help="Hydra overrides of the nominal actuator, as actuator.pole_pairs=7",
+        metavar="FILE | OVERRIDE",
+        help="files to list, or to guess a map for; of an import, Hydra overrides of the nominal actuator, as "
+        "actuator.pole_pairs=7",
     )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--list", action="store_true", help="show the channels of the files, with units and rates")
@@ -29,15 +29,14 @@ def run(args: argparse.Namespace) -> None:
     """
     from ..errors import InputError
 
-    overrides = [*args.overrides, *(word for word in args.files if "=" in word and not Path(word).exists())]
-    files = [word for word in args.files if word not in overrides]
+    files = args.overrides
     if args.map:
-        if files or not args.out:
-            raise InputError("--map: needs --out DIR, and takes its files from the map")
-        _import(args.map, args.out, overrides)
+        if not args.out:
+            raise InputError("--map: needs --out DIR, a folder to write to")
+        _import(args.map, args.out, args.overrides)
         return
     if not files:
-        raise InputError("which files? name at least one")
+        raise InputError("no file is named; name at least one")
     if args.list:
         from ..imports.listing import as_text, listed
 

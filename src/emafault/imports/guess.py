@@ -33,6 +33,8 @@ _PHASE = {
     "bc": 1,
     "ca": 2,
 }
+#: units where a file has none; decades are found by the import, a speed's unit altogether
+_USUAL = {"phase_voltage": "V", "phase_current": "A", "phase_current_end": "A", "bus_voltage": "V"}
 _BUS = re.compile(r"bus|dc|batt|supply|link", re.IGNORECASE)
 _COMMAND = re.compile(r"cmd|command|ref|soll|set|target|demand", re.IGNORECASE)
 _OUTPUT = re.compile(r"out|shaft|load|lvdt|surface|flap|user|position", re.IGNORECASE)
@@ -97,6 +99,8 @@ def _signals(channels: dict[str, tuple[str, str]]) -> dict:
             halls.append(name)
         elif _DUTY.search(bare) and phase is not None:
             duty[phase] = name
+        elif not kind and _BUS.search(bare):
+            single.setdefault("bus_voltage", name)
         elif kind == "V" or (not kind and _VOLTS.search(bare) and not _SPEED.search(bare)):
             if _BUS.search(bare) or phase is None:
                 single.setdefault("bus_voltage", name)
@@ -126,10 +130,10 @@ def _signals(channels: dict[str, tuple[str, str]]) -> dict:
         out["rotor_angle"] = {"channel": single.get("rotor_angle", BLANK)}
     out |= {k: {"channel": single.get(k, BLANK)} for k in ("output_position", "commanded_position")}
     out |= {k: {"channel": single[k]} for k in ("rotor_speed", "bus_voltage") if k in single}
-    for entry in out.values():
+    for signal, entry in out.items():
         named = [c for c in entry.get("channels", [entry.get("channel")]) if c]
-        if any(c in channels and not channels[c][1] for c in named):
-            entry["unit"] = "1" if entry.get("reference") == "duty" else BLANK
+        if signal != "rotor_speed" and any(c in channels and not channels[c][1] for c in named):
+            entry["unit"] = "1" if entry.get("reference") == "duty" else _USUAL.get(signal, BLANK)
     return out
 
 
