@@ -2,7 +2,7 @@
 
 import pytest
 
-from .measured import INTERVAL, simulated
+from .measured import INTERVAL, averaged, simulated
 
 
 @pytest.fixture(scope="session")
@@ -12,6 +12,6 @@ def fine():
 
 
 @pytest.fixture(scope="session")
-def truth():
+def truth(fine):
     """What the recording must be, without noise."""
-    return simulated(INTERVAL)
+    return averaged(fine, 10)

@@ -27,6 +27,14 @@ def simulated(step, duration=0.5, motion="reversal", fault=FAULT):
     return out | {"time": time_axis(duration, step)}
 
 
+def averaged(s, several):
+    """The same signals over intervals of several samples: means of means, and instants at the ends."""
+    instants = ("rotor_angle", "output_position", "commanded_position", "phase_current_end", "time")
+    n = len(s["time"]) // several * several
+    mean = {k: v[:n].reshape(-1, several, *v.shape[1:]).mean(axis=1) for k, v in s.items() if k not in instants}
+    return mean | {k: s[k][several - 1 : n : several] for k in instants}
+
+
 def rested(s, seconds):
     """The same signals after a rest, as a bench records them."""
     step = s["time"][1] - s["time"][0]

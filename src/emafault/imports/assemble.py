@@ -51,7 +51,7 @@ def recording_of(
             np.gradient(means["phase_current"], interval, axis=0) if ends is None else np.diff(ends, axis=0) / interval
         )
         turned = swept(actuator.pole_pairs * angle) / actuator.pole_pairs / interval
-        phase_voltage, misfit = with_modelled_star(phase_voltage, means["phase_current"], rate, turned)
+        phase_voltage, misfit, _ = with_modelled_star(phase_voltage, means["phase_current"], rate, turned)
         raw.lost.append(
             f"the star point was not measured: it is modelled from the line voltages, missed by {misfit:.2g} V there; "
             "what moves the star point alone cannot be told"

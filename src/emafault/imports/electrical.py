@@ -15,6 +15,8 @@ from itertools import permutations, product
 
 import numpy as np
 
+from .voltages import swept
+
 MOST_POLE_PAIRS = 12  # that are tried
 WINDOW = 1e-3  # s, or the longest at which the fastest electrical turn still has eight of them
 ORDERS = list(permutations(range(3)))
@@ -63,14 +65,43 @@ def misfits(recordings: Sequence[Windows], star, pole_pairs: Sequence[float]) ->
         rhs = np.concatenate([v.real, v.imag])
         for n, d in product(pole_pairs, (1, -1)):
             columns = regressors(w, n, d)
-            whole, solution = _squares(columns, rhs)
-            backward = (solution[0] < 0.0) | (solution[1] < 0.0)
-            if backward.any():  # a resistance is not negative: at best the current tells nothing
-                whole[backward] = _squares(columns[:, 2:], rhs[:, backward])[0]
+            whole, _ = _not_negative(columns, rhs)
             for (o, s), found in zip(tried, whole):
                 key = Reading(n, d, o, tuple(int(x) for x in s))
                 total[key] = total.get(key, 0.0) + float(found) / count
     return total
+
+
+def sharp_misfits(recordings: Sequence[Windows], star, pole_pairs: int) -> dict[Reading, float]:
+    """The same for one number of pole pairs, with the trapezoid as the back-EMF's shape where it fits better.
+
+    Each reading has the zero that its sine has: K = -i k exp(i zero) times the trapezoid's fundamental.
+    """
+    total: dict[Reading, float] = {}
+    count = sum(len(w.voltage) for w in recordings)
+    for w, d in product(recordings, (1, -1)):
+        h = np.diff(w.edges)
+        columns = regressors(w, pole_pairs, d)
+        for o, s in product(ORDERS, SIGNS):
+            v = space_vector(star(_read(w.voltage, o, s)))
+            rhs = np.concatenate([v.real, v.imag])[:, None]
+            sine, solution = _not_negative(columns, rhs)
+            zero = float(np.angle(solution[-2, 0] + 1j * solution[-1, 0])) + 0.5 * np.pi
+            turned = space_vector(swept(d * pole_pairs * w.angle_edge + zero)) / pole_pairs / h
+            shape = np.concatenate([turned.real, turned.imag])[:, None]
+            trapezoid, _ = _not_negative(np.concatenate([columns[:, :2], shape], axis=1), rhs)
+            key = Reading(pole_pairs, d, o, tuple(int(x) for x in s))
+            total[key] = total.get(key, 0.0) + float(min(sine[0], trapezoid[0])) / count
+    return total
+
+
+def _not_negative(columns: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of squared residuals (rhs,) and solutions with R and L not negative: at best the current tells nothing."""
+    whole, solution = _squares(columns, rhs)
+    backward = (solution[0] < 0.0) | (solution[1] < 0.0)
+    if backward.any():
+        whole[backward], solution[2:, backward] = _squares(columns[:, 2:], rhs[:, backward])
+    return whole, solution
 
 
 def unexplained(w: Windows, star, pole_pairs: int, time_constant: float, explaining: slice) -> float:
@@ -136,13 +167,10 @@ def _changes(r: Reading) -> int:
     return sum(k != m for k, m in enumerate(r.order)) + sum(s < 0 for s in r.signs) + (r.direction < 0)
 
 
-def runner_up(total: dict[Reading, float], chosen: Reading, differs) -> tuple[Reading, float]:
-    """The best of the readings that ``differs`` from the chosen one, and its margin.
-
-    Raises
-    ------
-    InputError : the chosen reading explains nothing
-    """
+def runner_up(total: dict[Reading, float], chosen: Reading, differs) -> tuple[Reading | None, float]:
+    """The best of the readings that ``differs`` from the chosen one, None where there is none, and its margin."""
     rivals = {r: x for r, x in total.items() if differs(r, chosen)}
+    if not rivals:
+        return None, np.inf
     other = min(rivals, key=lambda r: rivals[r])
     return other, rivals[other] / max(total[chosen], 1e-12)

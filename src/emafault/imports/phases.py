@@ -6,8 +6,8 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
-from .electrical import MOST_POLE_PAIRS, Reading, best, misfits, runner_up
-from .finding import Finding, decided
+from .electrical import MOST_POLE_PAIRS, Reading, best, misfits, runner_up, sharp_misfits
+from .finding import LEAST_MARGIN, Finding, decided
 from .loading import Raw
 from .probes import CURRENTS, LETTERS, Given, refuse_stated, scale
 from .voltages import lines_to_phases
@@ -35,22 +35,55 @@ def read_phases(
         )
     mistaken = {p * np.pi / 180.0: "rotor_angle in degrees", p * 2.0 * np.pi: "rotor_angle in turns"}
     total = misfits(windows, star, [*map(float, range(1, max(MOST_POLE_PAIRS, p) + 1)), *mistaken])
-    r = best(total)
-    out = []
+    r, out = best(total), []
 
     def say(what: str, words: Callable[[Reading], str], name: str) -> None:
         other, margin = runner_up(total, r, lambda x, y: getattr(x, name) != getattr(y, name))
-        out.append(decided(Finding(what, words(r), margin, words(other)), "record a faster motion, or a longer one"))
+        if other is not None:
+            out.append(decided(Finding(what, words(r), margin, words(other)), remedy))
+        else:
+            out.append(Finding(what, f"{words(r)}, as the map says", np.inf, "none that it allows"))
 
+    remedy = "record a faster or longer motion"
     say(POLE_PAIRS, lambda x: mistaken.get(x.pole_pairs, f"{x.pole_pairs:.4g}"), "pole_pairs")
     if r.pole_pairs != p:
         hint = "say signals.rotor_angle.source: electrical" if r.pole_pairs == 1 else "say signals.rotor_angle.unit"
         hint = hint if r.pole_pairs in (1, *mistaken) else f"give actuator.pole_pairs={r.pole_pairs:.0f}"
         raise InputError(f"{out[-1].text()}, the actuator has {p}; {hint}")
+    total = _as_stated(sharp_misfits(windows, star, p), given)
+    r = best(total)
+    remedy += ", or say order and sign of both phase_voltage and phase_current"
     say(ORDER, lambda x: "abc as " + _letters(x.order), "order")
-    say(SIGN, lambda x: "".join("+" if s > 0 else "-" for s in x.signs), "signs")
+    say(SIGN, lambda x: _signs(x.signs), "signs")
     say(DIRECTION, lambda x: "with the rotor" if x.direction > 0 else "against the rotor", "direction")
     return r, out
+
+
+def _as_stated(total: dict[Reading, float], given: Given) -> dict[Reading, float]:
+    """The readings that leave what the map states of voltages and currents alike.
+
+    Raises
+    ------
+    InputError : a reading that the map excludes fits better by the margin
+    """
+    specs = [given["signals"][name] for name in ("phase_voltage", "phase_current")]
+    kept = dict(total)
+    for key, name, plain in (("order", "order", (0, 1, 2)), ("sign", "signs", (1, 1, 1))):
+        if all(key in spec for spec in specs):
+            kept = {r: x for r, x in kept.items() if getattr(r, name) == plain}
+    first, stated = best(total), best(kept)
+    if first not in kept:
+        margin = total[stated] / max(total[first], 1e-12)
+        if margin >= LEAST_MARGIN:
+            raise InputError(
+                f"voltages beside currents: order {_letters(first.order)} and signs {_signs(first.signs)} fit "
+                f"{margin:.3g} times better than what the map states of both; take order and sign out"
+            )
+    return kept
+
+
+def _signs(signs: Sequence[int]) -> str:
+    return "".join("+" if s > 0 else "-" for s in signs)
 
 
 def _letters(order: Sequence[int]) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
-from .electrical import misfits
+from .electrical import sharp_misfits
 from .finding import Finding, decided
 from .loading import Raw
 from .scales import DECADES, nearest, sum_test
@@ -80,22 +80,26 @@ def check_pair(
             raw.phased["phase_current"] = [s if n != k or s is None else s.scaled(factor) for n, s in enumerate(three)]
             raw.phased["phase_current"] = list(phase_signals(raw, "phase_current"))
 
+    for raw in recordings:
+        raw.lost.append("the third current is less the sum of the two measured: no sum shows an error of either")
+    if "sign" in spec and "scale" in spec:
+        put(1.0)
+        return []
     tried = {}
     for factor in (1.0, -1.0, 10.0, -10.0, 0.1, -0.1):
         put(factor)
         windows = [w for raw in recordings if (w := windows_of(raw, interval, actuator.pole_pairs)) is not None]
-        tried[factor] = min(misfits(windows, star, [actuator.pole_pairs]).values()) if windows else np.inf
+        tried[factor] = min(sharp_misfits(windows, star, actuator.pole_pairs).values()) if windows else np.inf
     first, second = sorted(tried, key=lambda f: tried[f])[:2]
     put(first)
     words = {f: f"{LETTERS[k]} times {f:g}" if f != 1.0 else "as they are" for f in tried}
     finding = decided(
-        Finding("two currents", words[first], tried[second] / tried[first], words[second]), "measure the third"
+        Finding("two currents", words[first], tried[second] / tried[first], words[second]),
+        "measure the third, or say signals.phase_current.sign and scale",
     )
     for key, changed in (("sign", first < 0.0), ("scale", abs(first) != 1.0)):
         if changed:
             refuse_stated(spec, "phase_current", key, finding)
-    for raw in recordings:
-        raw.lost.append("the third current is less the sum of the two measured: no sum shows an error of either")
     return [finding]
 
 

@@ -22,7 +22,7 @@ from .loading import Raw, load
 from .mapping import read_map
 from .motion import senses, turn_round
 from .units import quantity
-from .voltages import floating_legs, star_part, terminals_from_duty
+from .voltages import floating_legs, star_part, swept, terminals_from_duty, with_modelled_star
 from .windows import windows_of
 from .zero import Electrical, fit
 
@@ -98,11 +98,15 @@ def _fit(raw: Raw, actuator: ActuatorParameters, interval: float) -> Electrical:
 
 def _with_floating_legs(raw: Raw, fitted: Electrical, actuator: ActuatorParameters, interval: float) -> Electrical:
     """The fit once legs that are off have their voltages: these need k, which the next fit has better."""
-    driven = raw.phased["phase_voltage"]
+    driven, back_emf = raw.phased["phase_voltage"], np.full(3, fitted.back_emf)
     for _ in range(PASSES):
-        raw.phased["phase_voltage"] = list(floating_legs(raw, driven, fitted.back_emf, actuator))
-        fitted = _fit(raw, actuator, interval)
-    return fitted
+        raw.phased["phase_voltage"] = list(floating_legs(raw, driven, back_emf, actuator))
+        w = windows_of(raw, interval, actuator.pole_pairs)
+        assert w is not None  # there were enough for the fit
+        h = np.diff(w.edges)[:, None]
+        turned = swept(actuator.pole_pairs * w.angle_edge) / actuator.pole_pairs / h
+        back_emf = with_modelled_star(w.voltage, w.current, np.diff(w.current_edge, axis=0) / h, turned)[2]
+    return _fit(raw, actuator, interval)
 
 
 def _set_zero(raw: Raw, given: Mapping[str, Any], fitted: Electrical, pole_pairs: int) -> Finding:

@@ -17,7 +17,7 @@ from .loading import Raw
 from .signal import Signal
 
 RAMP = np.pi / 6.0  # half of what the plateau leaves of half a turn, electrical rad
-SMALL = 0.02  # of the largest current, below which a switched-off leg carries none
+CARRIES = 5.0  # standard deviations of a current's noise, above which a switched-off leg still carries it
 
 
 def star_part(reference: str) -> Callable[[np.ndarray], np.ndarray]:
@@ -67,7 +67,7 @@ def terminals_from_duty(raw: Raw, actuator: ActuatorParameters) -> None:
         )
 
 
-def floating_legs(raw: Raw, channels: list, back_emf: float, actuator: ActuatorParameters) -> list[Signal]:
+def floating_legs(raw: Raw, channels: list, back_emf: np.ndarray, actuator: ActuatorParameters) -> list[Signal]:
     """Terminal voltages with those of legs that are off: a rail's while the current runs out, else the star point's and
     the back-EMF.
 
@@ -75,7 +75,7 @@ def floating_legs(raw: Raw, channels: list, back_emf: float, actuator: ActuatorP
     ----------
     raw : currents and angle put right
     channels : three terminal voltages, of driven legs without their switch's drop
-    back_emf : V s/rad
+    back_emf : (3,) V s/rad
     """
     assert raw.off is not None
     time, step = channels[0].time, channels[0].step
@@ -84,7 +84,7 @@ def floating_legs(raw: Raw, channels: list, back_emf: float, actuator: ActuatorP
     bus = raw.single["bus_voltage"].at(time)
     angle = raw.single["rotor_angle"]
     emf = back_emf * swept(actuator.pole_pairs * angle.at(np.append(time[0] - step, time))) / actuator.pole_pairs / step
-    small = SMALL * np.abs(current).max()
+    small = CARRIES * float(np.median(np.abs(current[raw.off]))) / 0.6745 if raw.off.any() else 0.0
     for j in range(3):
         off = raw.off[:, j]
         others = [k for k in range(3) if k != j]
@@ -128,8 +128,9 @@ def swept(x: np.ndarray) -> np.ndarray:
 
 def with_modelled_star(
     part: np.ndarray, current: np.ndarray, rate: np.ndarray, turned: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Phase voltages against the star point, and the misfit (V) of the line voltages that they are modelled from.
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Phase voltages against the star point, the misfit (V) of the line voltages that they are modelled from, and the
+    (3,) k (V s/rad) that these have.
 
     Each phase's R, L and k are fitted to the differences between phases, in which the star point is not; what these
     leave open, the mean of the three, is then that of R_j i_j + L_j di_j/dt + k_j f_j w.
@@ -155,4 +156,4 @@ def with_modelled_star(
     solution = np.linalg.lstsq(columns / scale, difference, rcond=1e-8)[0] / scale
     misfit = float(np.sqrt(np.mean((difference - columns @ solution) ** 2)))
     modelled = sum(term @ solution[3 * m : 3 * m + 3] for m, term in enumerate(terms)) / 3.0
-    return part - part.mean(axis=1, keepdims=True) + modelled[:, None], misfit
+    return part - part.mean(axis=1, keepdims=True) + modelled[:, None], misfit, solution[6:]
