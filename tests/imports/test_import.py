@@ -105,6 +105,9 @@ def test_a_mistake_is_found_and_put_right(mistake, reference, fine, truth, tmp_p
 REFUSED = {
     "voltages, round": (lambda x: x.swap("ua", "ub").swap("ub", "uc"), {}, "say signals.phase_voltage.order or"),
     "phases of both": (lambda x: x.swap("ub", "uc").swap("ib", "ic"), {}, "say sense: phases_reversed .* motion"),
+    "rotor and voltages at once": (
+        lambda x: x.change(angle=np.negative, speed=np.negative).swap("ub", "uc"), {}, "one way, .* the other; say sign: -1"
+    ),
     "speed in rpm": (lambda x: x.change(speed=lambda v: v * 30.0 / np.pi), {}, "rotor_speed: is 9.549 .* it is in rpm"),
     "angle in degrees": (lambda x: x.change(angle=np.rad2deg), {}, "rotor_speed: is 0.01745|rotor_speed beside"),
     "angle in electrical radians": (lambda x: x.change(angle=lambda v: 4.0 * v), {}, "rotor_speed"),

@@ -56,9 +56,10 @@ def turn_round(
     minority = {n for n, v in votes.items() if v != (for_it > len(votes) / 2)}
     if "phases" in minority and len(minority) == 1:
         minority = set()  # names of phases are the map's to say
-    elif 2 * for_it == len(votes) and SHAFT <= set(votes) and len({votes[n] for n in SHAFT}) == 1:
-        minority = {n for n, v in votes.items() if v == votes["output_position"]}
-    if minority and len(minority) > 1 and minority not in ({"rotor_angle", "rotor_speed"}, SHAFT):
+    tie = 2 * for_it == len(votes)
+    if tie and direction is not None and len({votes[n] for n in SHAFT}) == 1:
+        minority, tie = SHAFT, False  # one mistake explains it, of the rotor and the phases it would take two
+    if tie or (len(minority) > 1 and minority not in ({"rotor_angle", "rotor_speed"}, SHAFT)):
         one, other = (" and ".join(sorted(n for n, v in votes.items() if v == side)) for side in (True, False))
         raise InputError(f"{one} count one way, {other} the other; say sign: -1 of those that are reversed")
     out = []
