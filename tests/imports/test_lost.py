@@ -40,3 +40,26 @@ def test_hall_sensors_do_for_an_encoder(wiring, fine, truth, tmp_path):
     moving = np.abs(truth["rotor_speed"]) > 50.0
     assert np.sqrt(np.mean(turn[moving] ** 2)) < np.deg2rad(3.0)
     assert any("hall edges" in text for text in result.lost["one"])
+
+
+def test_end_currents_are_put_right_with_their_currents(fine, truth, tmp_path):
+    raw = log(fine)
+    ends = {f"e{'abc'[k]}": -fine["phase_current_end"][:, k] for k in range(3)}
+    raw.channels |= ends
+    raw.units |= dict.fromkeys(ends, "A")
+    given = map_of()
+    given["signals"]["phase_current_end"] = {"channels": list(ends)}
+    raw = raw.change(ia=np.negative, ib=np.negative, ic=np.negative).swap("ib", "ic").swap("eb", "ec")
+    result = bring(tmp_path, given, log=raw)
+    recording = result.recordings["one.nc"]
+    assert off(recording, truth) == [] and not any("end currents" in text for text in result.lost["one"])
+    assert recording.phase_current_end == pytest.approx(truth["phase_current_end"], abs=1e-9)
+
+
+def test_an_electrical_angle_is_divided_by_the_pole_pairs(fine, truth, tmp_path):
+    given = map_of()
+    given["signals"]["rotor_angle"] |= {"source": "electrical", "unit": "deg"}
+    turned = log(fine).change(angle=lambda v: np.rad2deg(ACTUATOR.pole_pairs * v) % 360.0)
+    result = bring(tmp_path, given, log=turned)
+    assert off(result.recordings["one.nc"], truth) == []
+    assert result.recordings["one.nc"].known["rotor_angle"] == {"source": "electrical"}

@@ -64,4 +64,4 @@ def _import(path: str, out: str, overrides: list[str]) -> None:
     for name, lost in result.lost.items():
         for text in dict.fromkeys(lost):
             print(f"{name}: {text}")
-    print(f"{len(result.recordings)} recordings and import.html written to {out}")
+    print(f"{', '.join(result.recordings)} and import.html written to {out}")

@@ -9,12 +9,15 @@ LEAST_MARGIN = 3.0  # times the misfit; a smaller one is refused
 
 @dataclass(frozen=True)
 class Finding:
-    """One decision. ``margin``: misfit (mean square) of the ``other`` reading over that of the one ``taken``."""
+    """One decision. ``margin``: misfit (mean square) of the ``other`` reading over that of the one ``taken``;
+    ``changed``: signals were changed by it.
+    """
 
     what: str
     taken: str
     margin: float
     other: str
+    changed: bool = False
 
     def text(self) -> str:
         """In one line."""

@@ -72,7 +72,7 @@ def turn_round(
             )
         for raw in recordings:
             raw.single[name] = raw.single[name].scaled(-1.0)
-        out.append(Finding(name, "turned round", margin, "as measured"))
+        out.append(Finding(name, "turned round", margin, "as measured", True))
     return out, "rotor_angle" in minority
 
 

@@ -132,7 +132,7 @@ def apply_phases(
             order = tuple(int(k) for k in np.argsort(phases))
             _reorder(recordings, CURRENTS, order)
             direction = -direction if odd else direction
-        out.append(Finding(moved, f"channels are of {_letters(order)}", margin[ORDER].margin, "abc"))
+        out.append(Finding(moved, f"channels are of {_letters(order)}", margin[ORDER].margin, "abc", True))
     out += _apply_signs(recordings, given, signs, r.order if moved == "phase_voltage" else (0, 1, 2), margin[SIGN])
     if lines:
         for raw in recordings:
@@ -146,7 +146,7 @@ def _apply_signs(recordings, given: Given, signs, place: Sequence[int], finding:
         name = "phase_voltage" if "sign" in given["signals"]["phase_current"] else "phase_current"
         refuse_stated(given["signals"][name], name, "sign", finding)
         scale(recordings, CURRENTS if name == "phase_current" else (name,), -np.ones(3))
-        out.append(Finding(name, "all turned round", finding.margin, "as measured"))
+        out.append(Finding(name, "all turned round", finding.margin, "as measured", True))
     single = np.array(signs) * usual
     if (single < 0).any():
         refuse_stated(given["signals"]["phase_voltage"], "phase_voltage", "sign", finding)
@@ -154,7 +154,7 @@ def _apply_signs(recordings, given: Given, signs, place: Sequence[int], finding:
         factors[list(place)] = single
         scale(recordings, ("phase_voltage",), factors)
         which = ", ".join(LETTERS[k] for k in range(3) if factors[k] < 0)
-        out.append(Finding("phase_voltage", f"channel of {which} turned round", finding.margin, "as measured"))
+        out.append(Finding("phase_voltage", f"channel of {which} turned round", finding.margin, "as measured", True))
     return out
 
 
@@ -198,4 +198,4 @@ def _apply_sense(recordings: Sequence[Raw], given: Given, direction: int, findin
     else:
         for raw in recordings:
             raw.single = {k: s if k == "bus_voltage" else s.scaled(-1.0) for k, s in raw.single.items()}
-    return [Finding("sense", f"{sense.replace('_', ' ')}, as the map says", finding.margin, "as measured")]
+    return [Finding("sense", f"{sense.replace('_', ' ')}, as the map says", finding.margin, "as measured", True)]

@@ -94,7 +94,7 @@ def check_pair(
     put(first)
     words = {f: f"{LETTERS[k]} times {f:g}" if f != 1.0 else "as they are" for f in tried}
     finding = decided(
-        Finding("two currents", words[first], tried[second] / tried[first], words[second]),
+        Finding("two currents", words[first], tried[second] / tried[first], words[second], first != 1.0),
         "measure the third, or say signals.phase_current.sign and scale",
     )
     for key, changed in (("sign", first < 0.0), ("scale", abs(first) != 1.0)):

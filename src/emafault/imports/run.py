@@ -145,15 +145,20 @@ def import_bench(path: str | Path, out: str | Path, actuator: ActuatorParameters
     given = read_map(path)
     result = imported(given, actuator, voltage_noise)
     folder = Path(out)
+    plain = given | {  # without the folders of this machine
+        "recordings": [
+            entry | {"files": {logger: Path(file).name for logger, file in entry["files"].items()}}
+            for entry in given["recordings"]
+        ]
+    }
     for entry in given["recordings"]:
         name = f"{entry['name']}.nc"
         digests = [
             hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in entry["files"].values() if Path(p).is_file()
         ]
         source = {"source": " ".join(Path(p).name for p in entry["files"].values()), "source_sha256": " ".join(digests)}
-        plain = given | {"recordings": [entry | {"files": {k: Path(p).name for k, p in entry["files"].items()}}]}
         recording = result.recordings[name]
         attributes = recording.attributes | source | {"import_map": json.dumps(plain, sort_keys=True)}
         write_recording(folder / name, replace(recording, attributes=attributes))
-    draw(result, given).write(folder / "import.html")
+    draw(result, plain).write(folder / "import.html")
     return result

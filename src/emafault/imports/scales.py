@@ -20,7 +20,7 @@ def nearest(what: str, ratio: float, factors: Mapping[float, str]) -> tuple[floa
     """
     far = {f: max(abs(np.log(max(ratio, 1e-12) / f)), CLOSEST) for f in factors}
     first, second = sorted(far, key=lambda f: far[f])[:2]
-    return first, Finding(what, factors[first], far[second] / far[first], factors[second])
+    return first, Finding(what, factors[first], far[second] / far[first], factors[second], first != 1.0)
 
 
 def sum_test(currents: Sequence[np.ndarray]) -> tuple[np.ndarray, Finding]:
@@ -40,7 +40,8 @@ def sum_test(currents: Sequence[np.ndarray]) -> tuple[np.ndarray, Finding]:
     first, second = sorted(tried, key=lambda f: tried[f])[:2]
     margin = tried[second] / max(tried[first], 1e-12)
     taken = _mostly_one(first)
-    return np.array(taken), Finding("currents that add up to zero", _words(taken), margin, _words(_mostly_one(second)))
+    other, changed = _words(_mostly_one(second)), taken != (1.0, 1.0, 1.0)
+    return np.array(taken), Finding("currents that add up to zero", _words(taken), margin, other, changed)
 
 
 def _unbalance(gram: np.ndarray, factors: np.ndarray) -> float:

@@ -14,9 +14,16 @@ _SPELT = {
 
 @lru_cache(maxsize=1)
 def registry():
-    """The registry of units, read once."""
-    import pint
+    """The registry of units, read once.
 
+    Raises
+    ------
+    InputError : pint is not installed
+    """
+    try:
+        import pint
+    except ImportError as error:
+        raise InputError("an import needs pint, which emafault[import] installs") from error
     return pint.UnitRegistry()
 
 
@@ -27,8 +34,9 @@ def spelt(unit: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that can be read."""
+    units = registry()
     try:
-        registry().parse_units(spelt(text))
+        units.parse_units(spelt(text))
     except Exception:  # pint raises many kinds for text that is no unit
         return False
     return bool(text)
@@ -41,8 +49,9 @@ def factor(unit: str, wanted: str, where: str) -> float:
     ------
     InputError : a unit that is none or of another kind
     """
+    units = registry()
     try:
-        return float(registry().Quantity(1.0, spelt(unit)).to(wanted).magnitude)
+        return float(units.Quantity(1.0, spelt(unit)).to(wanted).magnitude)
     except Exception as error:
         raise InputError(f"{where}: the unit '{unit}' is not one of {wanted} ({error})") from error
 
@@ -56,9 +65,10 @@ def quantity(given, wanted: str, where: str) -> float:
     """
     if isinstance(given, int | float):
         return float(given)
+    units = registry()
     try:
         number, _, unit = str(given).strip().partition(" ")
-        value = registry().Quantity(float(number), spelt(unit.strip()) or wanted)
+        value = units.Quantity(float(number), spelt(unit.strip()) or wanted)
         return float(value.to(wanted).magnitude)
     except Exception as error:
         raise InputError(f"{where}: got '{given}', accepted is a number with a unit of {wanted} ({error})") from error

@@ -178,6 +178,9 @@ def _read_open(path: Path, file) -> Recording:
         data[name] = np.ascontiguousarray(array.T)
         said = file.variables[name].ncattrs()
         known[name] = {k: file.variables[name].getncattr(k) for k in ("noise", *KNOWN.get(name, ())) if k in said}
+        noise = known[name].get("noise", 1.0)
+        if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
+            raise InputError(f"{path}: {name} has noise '{noise}', accepted is a positive number in its unit")
     reference = known["phase_voltage"].get("reference", "star")
     if reference not in REFERENCES:
         raise InputError(f"{path}: phase_voltage has reference '{reference}', read are {' and '.join(REFERENCES)}")

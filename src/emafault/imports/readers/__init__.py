@@ -51,7 +51,7 @@ def read_raw(path: str | Path):
     try:
         found = importlib.import_module(f".{module}", __name__).read(path)
     except ImportError as error:
-        raise InputError(f"{path}: needs {error.name}; pip install 'emafault[{extra}]'") from error
+        raise InputError(f"{path}: needs {error.name}, which emafault[{extra}] installs") from error
     except InputError:
         raise
     except Exception as error:  # libraries of many authors raise what they like on a damaged file
