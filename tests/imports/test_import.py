@@ -14,7 +14,7 @@ from emafault.io.bench import read_bench
 from emafault.io.recording import read_recording
 
 from .checks import ELECTRICAL, bring, off
-from .measured import ACTUATOR, log, map_of
+from .measured import ACTUATOR, INTERVAL, averaged, log, map_of, simulated
 from .writers import WITHOUT_UNITS, WRITERS, channel
 
 
@@ -176,6 +176,17 @@ def test_counts_wraps_units_and_stamps_are_as_the_map_says(fine, truth, tmp_path
         raw.channels[name] = np.append(raw.channels[name][:1], raw.channels[name][:-1])
     result = bring(tmp_path, given, log=raw)
     assert off(result.recordings["one.nc"], truth, command=1e-5) == []
+
+
+def test_recordings_of_a_bench_are_read_together_each_from_its_own_zero(fine, truth, tmp_path):
+    slow = simulated(0.1 * INTERVAL, motion="parabolic")
+    given = map_of()
+    second = given["recordings"][0] | {"name": "two", "file": "slow.parquet", "health": "healthy"}
+    given["recordings"].append(second)
+    later = log(slow).change(angle=lambda v: v + 1.0).swap("ub", "uc")
+    result = bring(tmp_path, given, log=log(fine).swap("ub", "uc"), slow=later)
+    assert off(result.recordings["one.nc"], truth) == [] == off(result.recordings["two.nc"], averaged(slow, 10))
+    assert result.recordings["two.nc"].health == "healthy" and len(result.warnings) > 0
 
 
 def test_the_example_of_the_documentation_fits_the_schema(tmp_path):

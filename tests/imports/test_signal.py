@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from emafault.errors import InputError
 from emafault.imports.signal import Signal, pulse_uncertainty
 
 from .checks import bring
@@ -55,3 +56,15 @@ def test_instants_of_pulses_are_averaged_and_their_uncertainty_is_written(tmp_pa
     assert 0.3 < np.sqrt(np.mean(error**2)) / noise < 1.5 and noise > NOISE["u"]
     assert any("a 200 us mean is uncertain by" in text for text in result.lost["one"])
     assert recording.phase_current_end is not None and len(coarse["time"]) >= len(recording.time)
+
+
+def test_pulses_that_samples_miss_are_refused_until_their_frequency_is_said(tmp_path):
+    s = simulated(1e-6, duration=0.3)
+    raw = log({name: values[::40] for name, values in s.items()}, "dc_minus", noisy=False)
+    given = map_of("dc_minus", "instants")
+    with pytest.raises(InputError, match=r"say signals\.phase_voltage\.pwm_frequency"):
+        bring(tmp_path, given, log=raw)
+    given["signals"]["phase_voltage"]["pwm_frequency"] = "17 kHz"
+    result = bring(tmp_path, given, log=log({name: values[::4] for name, values in s.items()}, "dc_minus"))
+    noise = result.recordings["one.nc"].known["phase_voltage"]["noise"]  # of what switches between 0 and 48 V
+    assert noise == pytest.approx(48.0 * 17e3 * 4e-6 / 6.0**0.5, rel=0.05)

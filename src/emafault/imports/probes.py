@@ -11,12 +11,32 @@ from .electrical import sharp_misfits
 from .finding import Finding, decided
 from .loading import Raw
 from .scales import DECADES, nearest, sum_test
+from .signal import pulses
 from .voltages import phase_signals
 from .windows import windows_of
 
 LETTERS = "abc"
 CURRENTS = ("phase_current", "phase_current_end")
+PER_PULSE = 8  # samples in a pulse's period: jumps at random, of pulses that samples miss, look like some four
 Given = Mapping[str, Any]
+
+
+def refuse_missed_pulses(recordings: Sequence[Raw], given: Given) -> None:
+    """Refuse voltages that jump from sample to sample: nothing shows how fast their pulses come.
+
+    Raises
+    ------
+    InputError : samples at instants that are too few in a pulse's period, whose frequency the map does not say
+    """
+    if "pwm_frequency" in given["signals"]["phase_voltage"]:
+        return
+    for raw in recordings:
+        for signal in _three(raw, "phase_voltage"):
+            if pulses(signal)[1] * signal.step > 1.0 / PER_PULSE:
+                raise InputError(
+                    f"{raw.name}: phase_voltage jumps from sample to sample, its pulses come faster than samples show; "
+                    "say signals.phase_voltage.pwm_frequency, or samples: means if each is one"
+                )
 
 
 def check_probes(recordings: Sequence[Raw], given: Given) -> list[Finding]:

@@ -55,10 +55,12 @@ def imported(given: Mapping[str, Any], actuator: ActuatorParameters, voltage_noi
     interval = quantity(given["interval"], "s", "interval")
     reference = given["signals"]["phase_voltage"]["reference"]
     recordings = load(given, actuator.pole_pairs)
+    star = star_part(reference)
     if reference == "duty":
         for raw in recordings:
             terminals_from_duty(raw, actuator)
-    star = star_part(reference)
+    else:
+        probes.refuse_missed_pulses(recordings, given)
     found = probes.check_probes(recordings, given)
     found += clocks(recordings, given, star, actuator, interval)
     found += probes.check_pair(recordings, given, actuator, star, interval)
