@@ -33,7 +33,7 @@ def align(raw: Raw, logger: str, first: str, star, actuator: ActuatorParameters,
     # both logs count from their own beginning: only the difference of their clocks is unknown
     starts = {name: min(s.time[0] for s in raw.signals() if s.logger == name) for name in (logger, first)}
     raw.change(lambda s: s.on_clock(starts[first] - starts[logger], 0.0) if s.logger == logger else s)
-    misfit = _criterion(raw, logger, star, actuator, interval)
+    misfit, least = _criterion(raw, logger, star, actuator, interval)
     spans = [_span(raw, name) for name in (logger, first)]
     reach = min(max(spans) - OVERLAP * min(spans), REACH)
     turn = electrical_turn(raw, actuator.pole_pairs)
@@ -52,7 +52,8 @@ def align(raw: Raw, logger: str, first: str, star, actuator: ActuatorParameters,
     taken = f"{1e3 * skew:.2f} ms later than the start of {first}, {1e6 * drift:.0f} ppm slow"
     finding = Finding(f"{raw.name}: clock of {logger}", taken, rival / max(best, 1e-12), f"{1e3 * other:.2f} ms")
     decided(finding, f"say loggers.{logger}.clock.skew, or record a motion that starts and stops")
-    known = _width(misfit, skew, drift, max(s.step for s in raw.signals() if s.logger == logger))
+    step = max(s.step for s in raw.signals() if s.logger == logger)
+    known = max(_width(misfit, skew, drift, step), least)
     raw.lost.append(
         f"the clock of {logger} is found to {1e6 * known:.0f} us: a lag of that between the loggers is not told"
     )
@@ -83,10 +84,11 @@ def _span(raw: Raw, logger: str) -> float:
     return min(s.end for s in mine) - max(s.begin for s in mine)
 
 
-def _criterion(raw: Raw, logger: str, star, actuator: ActuatorParameters, interval: float) -> Misfit:
-    """Misfit as a function of skew and drift: of the voltage equation, or of the shaft with the rotor.
+def _criterion(raw: Raw, logger: str, star, actuator: ActuatorParameters, interval: float) -> tuple[Misfit, float]:
+    """Misfit as a function of skew and drift, of the voltage equation or of the shaft with the rotor; and the time (s)
+    that it cannot tell in any case, of a shaft the play's.
 
-    It is that with the logger's signals over that without, so that stretches in which little moves count for little.
+    The former is that with the logger's signals over that without, so that where little moves little counts.
     """
     p, time_constant = actuator.pole_pairs, actuator.inductance / actuator.resistance
     parts = {k: next(s for s in raw.phased[k] if s is not None) for k in ("phase_voltage", "phase_current")}
@@ -100,7 +102,7 @@ def _criterion(raw: Raw, logger: str, star, actuator: ActuatorParameters, interv
             w = windows_of(raw, interval, p, logger, skew, drift, longest)
             return unexplained(w, star, p, time_constant, explaining) if w is not None else np.inf
 
-        return of_voltages
+        return of_voltages, 0.0
     rotor, shaft = raw.single["rotor_angle"], raw.single["output_position"]
     if rotor.logger == shaft.logger:
         raise InputError(f"{raw.name}: nothing on the logger {logger} shows its clock; say loggers.{logger}.clock.skew")
@@ -112,7 +114,8 @@ def _criterion(raw: Raw, logger: str, star, actuator: ActuatorParameters, interv
         likeness = np.corrcoef(x, y)[0, 1] if np.ptp(x) > 0.0 and np.ptp(y) > 0.0 else 0.0
         return float(1.0 - likeness**2)
 
-    return of_shaft
+    shaft_speed = 2.0 * np.pi / (p * electrical_turn(raw, p) * actuator.gear_ratio)
+    return of_shaft, actuator.backlash / shaft_speed
 
 
 def clocks(recordings: Sequence[Raw], given, star, actuator: ActuatorParameters, interval: float) -> list[Finding]:
@@ -122,7 +125,7 @@ def clocks(recordings: Sequence[Raw], given, star, actuator: ActuatorParameters,
     for raw in recordings:
         for logger, settings in given["loggers"].items():
             clock = settings["clock"]
-            if logger == first or logger not in raw.entry["files"] or clock == "same":
+            if logger == first or clock == "same" or not any(s.logger == logger for s in raw.signals()):
                 continue
             if clock == "found":
                 out.append(align(raw, logger, first, star, actuator, interval))
