@@ -109,6 +109,7 @@ REFUSED = {
         lambda x: x.change(angle=np.negative, speed=np.negative).swap("ub", "uc"), {}, "one way, .* the other; say sign"
     ),
     "speed in rpm": (lambda x: x.change(speed=lambda v: v * 30.0 / np.pi), {}, "rotor_speed: is 9.549 .* it is in rpm"),
+    "another machine": (scaled(4.0 / 3.0, "angle", "speed"), {}, "pole pairs: 3 .*, the actuator has 4; give .*=3"),
     "angle in degrees": (lambda x: x.change(angle=np.rad2deg), {}, "rotor_speed: is 0.01745|rotor_speed beside"),
     "angle in electrical radians": (lambda x: x.change(angle=lambda v: 4.0 * v), {}, "rotor_speed"),
     "shaft in degrees": (lambda x: x.change(out=np.rad2deg), {}, "output_position: moves 57.3 times .* in degrees"),
