@@ -41,6 +41,15 @@ BROKEN = {
     "time backwards": (lambda r: replace(r, time=r.time[::-1].copy()), "time does not increase"),
     "0.1 s": (lambda r: recording(500), "at least 0.2 s are needed"),
     "never in motion": (lambda r: replace(r, rotor_speed=np.zeros(1200)), "never leaves zero"),
+    "line voltages": (
+        lambda r: replace(r, known={"phase_voltage": {"reference": "line_to_line"}}),
+        "'line_to_line', read",
+    ),
+    "noise in words": (
+        lambda r: replace(r, known={"rotor_speed": {"noise": "small"}}),
+        "rotor_speed has noise 'small'",
+    ),
+    "no noise": (lambda r: replace(r, known={"rotor_speed": {"noise": 0.0}}), "accepted is a positive number"),
     "unknown health": (lambda r: replace(r, attributes={"health": "fine"}), "health is 'fine'"),
 }
 
@@ -51,7 +60,16 @@ def test_a_whole_recording_comes_back_as_it_was(tmp_path):
     back = read_recording(tmp_path / "a.nc")
     for name in (*SAMPLES, "time"):
         np.testing.assert_array_equal(getattr(back, name), getattr(good, name))
-    assert back.phase_current_end is None and back.fault is None and back.health == "unknown"
+    assert back.phase_current_end is None and back.fault is None and back.health == "unknown" and back.known == {}
+
+
+def test_what_is_known_of_a_variable_comes_back(tmp_path):
+    known = {
+        "phase_voltage": {"reference": "modelled_star", "noise": 0.7}, "phase_current": {"derived": "c"},
+        "rotor_angle": {"source": "hall"}, "rotor_speed": {"noise": 0.4},
+    }  # fmt: skip
+    write_recording(tmp_path / "a.nc", replace(recording(), known=known))
+    assert read_recording(tmp_path / "a.nc").known == known
 
 
 @pytest.mark.parametrize("kind", BROKEN)

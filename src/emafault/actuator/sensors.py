@@ -23,7 +23,8 @@ class SensorNoise:
     ambient: float
 
 
-_CHANNEL = {
+#: recorded variable -> its field of ``SensorNoise``
+CHANNEL = {
     "phase_voltage": "voltage",
     "phase_current": "current",
     "phase_current_end": "current_end",
@@ -70,7 +71,7 @@ def measure(
         if chain:
             chain.before_noise(own)
         out["ambient_temperature"][r] += noise.ambient * rng.standard_normal()
-        for name, channel in _CHANNEL.items():
+        for name, channel in CHANNEL.items():
             if name in out:
                 values = out[name][r]
                 values += getattr(noise, channel) * rng.standard_normal(values.shape)

@@ -12,6 +12,7 @@ for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 #: subcommand -> what it does; its module of the same name has ``arguments(parser)`` and ``run(args)``
 COMMANDS = {
+    "import": "make recordings of measured files of any logger, by a map of their channels",
     "simulate": "simulate one recording of an actuator with a given fault",
     "identify": "identify the fault vector in recordings",
     "diagnose": "say where a simulator and a bench disagree, which effect causes it and how far it explains it",

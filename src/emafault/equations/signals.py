@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
-from ..actuator.sensors import SensorNoise
+from ..actuator.sensors import CHANNEL, SensorNoise
 from ..io.recording import Recording
 from ..io.sensors import cut_off, without_spikes
 from .dual import Dual
@@ -151,7 +151,8 @@ def odd(samples: float) -> int:
 
 
 def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> SensorNoise:
-    """Noise of the channels that regressors are made of, from differences in which the motion hardly shows.
+    """Noise of the channels that regressors are made of, from differences in which the motion hardly shows; what every
+    recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, that of the end currents where a phase floats.
     """
@@ -192,8 +193,19 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k)))
             for k, v in limits.items()
             if np.isfinite(v)
-        },
+        }
+        | _stated(recordings),
     )
+
+
+def _stated(recordings: Sequence[Recording]) -> dict[str, float]:
+    """Noise by field of ``SensorNoise`` that every recording states: the root of the mean square."""
+    out = {}
+    for variable, channel in CHANNEL.items():
+        said = [r.known.get(variable, {}).get("noise") for r in recordings]
+        if None not in said:
+            out[channel] = float(np.sqrt(np.mean(np.square(np.array(said, float)))))
+    return out
 
 
 def lattice_step(x: np.ndarray) -> float:

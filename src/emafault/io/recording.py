@@ -7,6 +7,7 @@ the file it leads, (phase, time).
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,9 @@ VARIABLES: dict[str, tuple[bool, str, bool, str]] = {
     "bus_voltage": (False, "V", False, "mean over the interval"),
 }
 MINIMUM_DURATION = 0.2  # s
+#: variable -> attributes that a recording may have which was not born in the format, besides ``noise`` of any variable
+KNOWN = {"phase_voltage": ("reference",), "phase_current": ("derived",), "rotor_angle": ("source",)}
+REFERENCES = ("star", "modelled_star")  # of phase voltages that are read here
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,7 @@ class Recording:
     bus_voltage: np.ndarray | None = None  # (time,)
     fault: np.ndarray | None = None  # (6,)
     attributes: dict[str, str] = field(default_factory=dict)
+    known: dict[str, dict[str, Any]] = field(default_factory=dict)  # variable -> what is known of it, see ``KNOWN``
     name: str = ""
 
     @property
@@ -84,6 +89,7 @@ def write_recording(path: str | Path, recording: Recording) -> None:
                 dims = ("phase", "time") if phased else ("time",)
                 variable = file.createVariable(name, "f8", dims, zlib=True, complevel=1)
                 variable.units, variable.long_name = unit, long_name
+                variable.setncatts(recording.known.get(name, {}))
                 variable[:] = values.T if phased else values
             ambient = file.createVariable("ambient_temperature", "f8", ())
             ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
@@ -163,12 +169,21 @@ def _read_open(path: Path, file) -> Recording:
     if step * len(time) < MINIMUM_DURATION * (1 - 1e-9):
         raise InputError(f"{path}: holds {step * len(time):.3g} s of data; at least {MINIMUM_DURATION} s are needed")
     data: dict[str, np.ndarray | None] = {}
+    known: dict[str, dict[str, Any]] = {}
     for name, (phased, unit, _, _) in VARIABLES.items():
         if name not in file.variables:
             data[name] = None
             continue
         array = values(name, ("phase", "time") if phased else ("time",), unit)
         data[name] = np.ascontiguousarray(array.T)
+        said = file.variables[name].ncattrs()
+        known[name] = {k: file.variables[name].getncattr(k) for k in ("noise", *KNOWN.get(name, ())) if k in said}
+        noise = known[name].get("noise", 1.0)
+        if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
+            raise InputError(f"{path}: {name} has noise '{noise}', accepted is a positive number in its unit")
+    reference = known["phase_voltage"].get("reference", "star")
+    if reference not in REFERENCES:
+        raise InputError(f"{path}: phase_voltage has reference '{reference}', read are {' and '.join(REFERENCES)}")
     speed = data["rotor_speed"]
     assert speed is not None
     if not np.any(speed != 0.0):
@@ -186,6 +201,7 @@ def _read_open(path: Path, file) -> Recording:
         ambient_temperature=ambient,
         fault=fault,
         attributes=attributes,
+        known={name: said for name, said in known.items() if said},
         name=path.name,
         **data,  # type: ignore[arg-type]
     )
