@@ -18,10 +18,12 @@ from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
 from .io.atomic import replace_atomically, write_text
+from .io.places import file_at
 from .io.recording import PHASES, VARIABLES, Recording
 from .progress import progress, say
 
 BLOCK = 25  # runs simulated, written and read at a time
+FASTEST = 5.0  # times the speed at which the back-EMF of a phase is the bus voltage
 CHUNK_CACHE = 2**20  # bytes a variable; chunks are written and read whole, the library's 16 MB would only fill up
 
 
@@ -119,7 +121,19 @@ def simulate_blocks(
         rows = slice(start, min(start + BLOCK, last))
         runs = sample.records(rows)
         signals = measure(simulate(runs, command, duration, interval), runs, noise, spec["seed"], first_run=start)
+        _refuse_runaway(signals["rotor_speed"], spec["actuator"])
         yield Block(start, interval, signals, sample.faults[rows])
+
+
+def _refuse_runaway(speed: np.ndarray, actuator: Mapping[str, Any]) -> None:
+    """Refuse simulated speeds (rad/s) that are no numbers, or far above what the bus voltage can drive."""
+    largest = FASTEST * actuator["bus_voltage"] / actuator["back_emf"]
+    reached = float(np.max(np.abs(speed)))
+    if not reached <= largest:
+        raise InputError(
+            f"rotor_speed: would reach {reached:.3g} rad/s, accepted is up to {largest:.3g} rad/s, {FASTEST:g} times "
+            "what the bus voltage can drive; a load, an effect or a parameter of the actuator is impossible"
+        )
 
 
 def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:
@@ -232,8 +246,7 @@ def read_blocks(paths: Sequence[str | Path], names: Sequence[str] | None = None)
     import netCDF4
 
     for path in map(Path, paths):
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
+        file_at(path)
         try:
             with netCDF4.Dataset(path) as file:
                 missing = [n for n in ("time", "fault", "ambient_temperature", *VARIABLES) if n not in file.variables]

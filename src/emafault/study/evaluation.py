@@ -12,9 +12,10 @@ from ..faults import FAULT_NAMES
 from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
 from ..identification.identifier import Identifier
 from ..io.atomic import replace_atomically
+from ..io.plain import read_json
 from ..reconstruction.calibration import calibrate
 from .features import FeatureTable, read_features
-from .networks import HISTORY, folders, read_json, seed_folder, width_of, write_json
+from .networks import HISTORY, folders, seed_folder, width_of, write_json
 
 FEW = 10  # rows of the paper's external validation
 _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation

@@ -8,12 +8,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..io.plain import read_json
 from ..reporting import errors as error_figures
 from ..reporting import paper as paper_figures
 from ..reporting import search as search_figures
 from ..reporting.page import Page
 from ..reporting.style import named
-from .networks import folders, read_json
+from .networks import folders
 
 #: what the paper reports on ten fresh rows
 PAPER_DT, PAPER_SHARE, PAPER_SECONDS = 1.8, 0.02, 50.0

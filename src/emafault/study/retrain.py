@@ -19,12 +19,13 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.identifier import fit_identifier
 from ..io.bench import read_bench
+from ..io.plain import read_json
 from ..io.recording import Recording
 from ..progress import progress, say
 from ..reconstruction import Features, join_features, reconstruct
 from ..reporting.retrained import show_in_report
 from ..reporting.written import REPORT, VERDICT
-from .networks import read_json, width_of, write_json
+from .networks import width_of, write_json
 
 BLOCK = 25
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..io.plain import read_json
 from ..tracking import Entry, ensure_experiment, log_run
-from .networks import folders, read_json, write_json
+from .networks import folders, write_json
 
 
 def prepare_tracking(spec: Mapping[str, Any], output: str) -> None:
