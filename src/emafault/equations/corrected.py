@@ -9,6 +9,7 @@ import numpy as np
 
 from ..diagnosis.forms import FORMS
 from ..errors import InputError
+from ..io.places import kind, refuse_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
 from .acquisition import advanced, delayed, full_range
@@ -73,15 +74,17 @@ def new_folder(bench: str | Path, folder: str | Path) -> Path:
 
     Raises
     ------
-    InputError : it is the bench's own, or holds files already
+    InputError : it is the bench's own, holds files already, or cannot be written
     """
     folder = Path(folder)
+    kind(folder, "--corrected")
     if (
         folder.resolve() == Path(bench).resolve()
         or (folder.exists() and not folder.is_dir())
         or (folder.is_dir() and any(folder.iterdir()))
     ):
         raise InputError(f"--corrected: '{folder}' holds files already, accepted is a new folder")
+    refuse_folder(folder, "--corrected")
     return folder
 
 

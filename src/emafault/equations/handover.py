@@ -3,6 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..errors import one_line
+from ..io.plain import escaped
+from ..reporting.written import FROM_DIAGNOSIS
+
 
 def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[str, float]], name: str) -> str:
     """A Hydra experiment in YAML.
@@ -17,18 +21,18 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
     rounded = {e: {p: float(f"{v:.8g}") for p, v in values.items()} for e, values in effects.items()}
     named = sorted({e for e in verdict["which"][0]["effects"] if e != "unknown"})
     what = f"{_in_words(named)} and its unit's tolerances" if named else "its unit's tolerances alone"
+    bench = one_line(verdict["bench"])  # a name's line break would end the comment, its ${} be looked up
     body = OmegaConf.to_yaml(
         OmegaConf.create(
             {
                 "name": name,
-                "question": f"How well is the actuator of bench {verdict['bench']} identified with {what} simulated?",
+                "question": escaped(f"How well is the actuator of bench {bench} identified with {what} simulated?"),
                 "effects": rounded,
             }
         )
     )
     head = (
-        "# @package _global_\n"
-        f"# from the diagnosis of {verdict['bench']}: verdict {verdict['verdict']}, digest {verdict['digest']}\n"
+        f"{FROM_DIAGNOSIS}{bench}: verdict {verdict['verdict']}, digest {verdict['digest']}\n"
         "defaults:\n"
         "  - override /reconstruction: [weighted, weighted_floating]\n"
         "  - override /search: none\n"

@@ -9,13 +9,14 @@ from typing import Any
 import yaml
 
 from ..io.atomic import write_text
+from ..io.places import file_name
 from ..machines.diagnose import Diagnosed, diagnose
 from ..machines.library import build, read_cases, stated
 from ..machines.page import body, finding
 from ..machines.reconstructed import Reconstructed, reconstruct_measured
 from ..machines.withheld import Withheld, check_file, names_of
 from ..reporting.page import Page
-from ..reporting.written import checked, file_name
+from ..reporting.written import checked
 
 KINDS = {
     "put in": "Changes put in by hand, whose cause is known",
