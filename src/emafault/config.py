@@ -405,20 +405,24 @@ def bench_name(bench: str) -> str:
 
 
 def bench_files(bench: str) -> list[str]:
-    """Files of a bench, in order of name.
+    """Files of a bench, in order of name, for the workflow.
 
     Raises
     ------
-    InputError : no bench given, or a path that does not exist
+    InputError : no bench given, a path that does not exist, or one with braces, which Snakemake reads as wildcards
     """
     if not bench:
         raise InputError("bench: none given, --config bench=PATH names a folder of recordings")
     found = kind(bench, "bench")
-    if found == "folder":
-        return sorted(str(p) for p in Path(bench).iterdir() if p.is_file() and not p.name.startswith("."))
-    if found != "file":
+    if found not in ("file", "folder"):
         raise InputError(f"bench: {shown(bench)}: no such file or folder")
-    return [bench]
+    files = [bench]
+    if found == "folder":
+        files = sorted(str(p) for p in Path(bench).iterdir() if p.is_file() and not p.name.startswith("."))
+    for file in files:
+        if set(file) & set("{}"):
+            raise InputError(f"bench: {shown(file)}: the workflow accepts no braces, emafault diagnose does")
+    return files
 
 
 #: what ``snakemake --config`` may set

@@ -193,11 +193,6 @@ def bench_files(wildcards):
         sys.exit(f"emafault: {one_line(error)}")
 
 
-def bench_path(wildcards):
-    """Where the bench is: from a function, since Snakemake reads braces in a text as wildcards."""
-    return BENCH
-
-
 def withheld_measured(wildcards):
     """Rows of the measured recordings, of a draw that shows them."""
     return rules.diagnose_machines.output.withheld if configuration.withheld_shows_measured(wildcards.draw) else []

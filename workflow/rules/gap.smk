@@ -20,7 +20,7 @@ rule diagnose_gap:
         runtime=10,
         tracking=1,
     params:
-        bench=bench_path,
+        bench=BENCH,
         twin=str(config.get("twin", "actuator")),
         spec=configuration.diagnosis_spec(PLAN.cases[0].config),
         code=code("diagnose_gap"),
@@ -39,7 +39,7 @@ rule retrain_network:
         mem_mb=2000,
         runtime=30,
     params:
-        bench=bench_path,
+        bench=BENCH,
         spec=configuration.retraining_spec(PLAN.cases[0].config),
         code=code("retrain_network"),
     script:

@@ -49,7 +49,7 @@ def diagnose_folder(
     """
     name = bench_name(path)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / file_name(name)
-    refuse_foreign(folder, [name], "actuator", force)  # before the work, not after it
+    refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
     if corrected is not None:
         new_folder(path, corrected)
     bench, found = diagnosed(path, spec, exclude)

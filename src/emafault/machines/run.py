@@ -50,9 +50,10 @@ def diagnose_file(
     name = bench_name(path)
     folder = Path(out) if out is not None else results_folder() / "diagnoses" / file_name(name)
     folders = _folders(folder, list(cases))
-    for place in {folder, *folders.values()}:  # before the work, not after it
-        refuse_foreign(place, [name, *cases], machine.name, force)
     machines = {case: build(machine, case, arrays).without(*exclude) for case, arrays in cases.items()}
+    twins = {machine.name, *(one.name for one in machines.values())}
+    for place in {folder, *folders.values()}:  # before the work, not after it
+        refuse_foreign(place, [name, *cases], twins, force)
     found: dict[str, Diagnosed] = {}
     for case, one in machines.items():
         found[case] = diagnose(one)

@@ -62,12 +62,13 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def refuse_foreign(folder: Path, benches: Collection[str], twin: str, force: bool) -> None:
+def refuse_foreign(folder: Path, benches: Collection[str], twins: Collection[str], force: bool) -> None:
     """Refuse a folder of results that cannot be written, or whose files no diagnosis of this bench has written.
 
     Parameters
     ----------
     benches : names of the bench and of its cases
+    twins : names of the machine, which a verdict has
     force : whether files that are not of this bench may be replaced
 
     Raises
@@ -79,7 +80,7 @@ def refuse_foreign(folder: Path, benches: Collection[str], twin: str, force: boo
     for path in there:
         refuse_irregular(path, "--out")
     ours = [folder / EXPERIMENT] if _is_experiment(folder / EXPERIMENT) else []
-    if not force and there != ours and not _is_verdict(folder / VERDICT, benches, twin):
+    if not force and there != ours and not _is_verdict(folder / VERDICT, benches, twins):
         raise InputError(f"--out: {shown(there[0])}: is not of a diagnosis of this bench, --force replaces it")
 
 
@@ -93,12 +94,12 @@ def refuse_experiment(path: Path) -> None:
     refuse_output(path, "--experiment", force=_is_experiment(path) or not path.exists())
 
 
-def _is_verdict(path: Path, benches: Collection[str], twin: str) -> bool:
+def _is_verdict(path: Path, benches: Collection[str], twins: Collection[str]) -> bool:
     try:
         read = read_json(path)
     except InputError:
         return False
-    return isinstance(read, dict) and read.get("bench") in benches and read.get("twin") == twin
+    return isinstance(read, dict) and read.get("bench") in benches and read.get("twin") in twins
 
 
 def _is_experiment(path: Path) -> bool:
