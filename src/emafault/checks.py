@@ -6,7 +6,7 @@ from typing import Any
 
 from . import schema
 from .errors import InputError, shown
-from .io.places import kind
+from .places import kind
 
 _SCHEMAS = {
     "actuator": schema.Actuator,

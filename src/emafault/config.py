@@ -18,9 +18,9 @@ from omegaconf import OmegaConf
 from . import checks, schema
 from .effects import EFFECTS
 from .errors import InputError, one_line, shown
-from .io.places import file_at, file_name, kind
-from .io.plain import read_yaml
 from .paths import CONF
+from .places import file_at, file_name, kind
+from .plain import read_yaml
 
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))

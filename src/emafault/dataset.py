@@ -18,8 +18,8 @@ from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
 from .io.atomic import replace_atomically, write_text
-from .io.places import file_at
 from .io.recording import PHASES, VARIABLES, Recording
+from .places import file_at
 from .progress import progress, say
 
 BLOCK = 25  # runs simulated, written and read at a time
@@ -121,19 +121,21 @@ def simulate_blocks(
         rows = slice(start, min(start + BLOCK, last))
         runs = sample.records(rows)
         signals = measure(simulate(runs, command, duration, interval), runs, noise, spec["seed"], first_run=start)
-        _refuse_runaway(signals["rotor_speed"], spec["actuator"])
+        _refuse_runaway(signals, spec["actuator"])
         yield Block(start, interval, signals, sample.faults[rows])
 
 
-def _refuse_runaway(speed: np.ndarray, actuator: Mapping[str, Any]) -> None:
-    """Refuse simulated speeds (rad/s) that are no numbers, or far above what the bus voltage can drive."""
+def _refuse_runaway(signals: Mapping[str, np.ndarray], actuator: Mapping[str, Any]) -> None:
+    """Refuse simulated signals that are no numbers, or speeds (rad/s) far above what the bus voltage can drive."""
+    why = "a load, an effect or a parameter of the actuator is impossible"
+    for name, values in signals.items():
+        if not np.all(np.isfinite(values)):
+            raise InputError(f"{name}: would hold NaN or infinite values; {why}")
     largest = FASTEST * actuator["bus_voltage"] / actuator["back_emf"]
-    reached = float(np.max(np.abs(speed)))
-    if not reached <= largest:
-        raise InputError(
-            f"rotor_speed: would reach {reached:.3g} rad/s, accepted is up to {largest:.3g} rad/s, {FASTEST:g} times "
-            "what the bus voltage can drive; a load, an effect or a parameter of the actuator is impossible"
-        )
+    reached = float(np.max(np.abs(signals["rotor_speed"])))
+    if reached > largest:
+        accepted = f"accepted is up to {largest:.3g} rad/s, {FASTEST:g} times what the bus voltage can drive"
+        raise InputError(f"rotor_speed: would reach {reached:.3g} rad/s, {accepted}; {why}")
 
 
 def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 
 from . import __version__
 from .errors import InputError
-from .io.places import kind
+from .places import kind
 
 _SQLITE = "sqlite:///"
 _LONGEST_VALUE = 6000

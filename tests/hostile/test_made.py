@@ -14,7 +14,7 @@ from emafault.equations.handover import experiment_text
 from emafault.errors import InputError
 from emafault.identification.search import open_study
 from emafault.io.atomic import write_text
-from emafault.io.plain import read_yaml
+from emafault.plain import read_yaml
 from emafault.tracking import ensure_experiment
 from machines import line
 

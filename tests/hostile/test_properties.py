@@ -16,8 +16,8 @@ from emafault.actuator.commands import read_command
 from emafault.errors import InputError, one_line
 from emafault.identification.identifier import Identifier
 from emafault.io.bench import check_bench
-from emafault.io.plain import escaped, read_yaml
 from emafault.io.recording import read_recording, write_recording
+from emafault.plain import escaped, read_yaml
 from emafault.reconstruction import reconstruct
 
 from .conftest import say, state
@@ -204,7 +204,7 @@ def test_escaped_text_stays_as_it_is(text):
 
 
 def test_a_path_of_any_text_is_a_place_or_refused(workshop):
-    from emafault.io.places import kind, refuse_folder, refuse_output
+    from emafault.places import kind, refuse_folder, refuse_output
 
     @examples(200)
     @given(text=st.text(max_size=300))

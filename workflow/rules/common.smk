@@ -8,7 +8,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from emafault import config as configuration
 from emafault import provenance
 from emafault.errors import InputError, one_line
-from emafault.io.places import refuse_folder
+from emafault.places import refuse_folder
 
 RESULTS = "results"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, one_line, shown
-from ..io.places import file_at
+from ..places import file_at
 
 LARGEST_POSITION = 100.0  # rad of a commanded position
 CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner

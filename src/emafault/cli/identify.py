@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> None:
 
     from ..identification.recordings import identify_recordings
     from ..io.atomic import write_text
-    from ..io.places import refuse_output
     from ..io.recording import read_recording, recordings_in
+    from ..places import refuse_output
     from .model import load_model
 
     paths, healthy = recordings_in(args.files), recordings_in(args.reference)

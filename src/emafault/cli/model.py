@@ -15,9 +15,9 @@ from ..errors import InputError, shown
 from ..identification.identifier import Identifier
 from ..identification.intervals import ConformalIntervals
 from ..identification.recordings import Model
-from ..io.places import kind
-from ..io.plain import read_json, read_yaml
 from ..paths import results_folder
+from ..places import kind
+from ..plain import read_json, read_yaml
 
 
 def load_model(experiment: str, choice: str | None = None, results: str | Path | None = None) -> Model:

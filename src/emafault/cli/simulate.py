@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> None:
 
     from .. import config
     from ..dataset import simulate_recording
-    from ..io.places import refuse_output
     from ..io.recording import write_recording
+    from ..places import refuse_output
 
     fault, overrides = read_fault(args.fault)
     overrides = [*args.overrides, *overrides]

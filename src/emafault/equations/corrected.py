@@ -9,9 +9,9 @@ import numpy as np
 
 from ..diagnosis.forms import FORMS
 from ..errors import InputError
-from ..io.places import kind, refuse_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
+from ..places import kind, refuse_folder
 from .acquisition import advanced, delayed, full_range
 from .diagnose import Diagnosed
 

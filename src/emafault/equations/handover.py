@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import one_line
-from ..io.plain import escaped
+from ..plain import escaped
 from ..reporting.written import FROM_DIAGNOSIS
 
 

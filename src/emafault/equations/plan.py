@@ -11,9 +11,9 @@ from ..actuator.commands import COMMANDS, command_positions
 from ..errors import InputError, shown
 from ..io.atomic import write_text
 from ..io.bench import bench_name
-from ..io.places import file_name, refuse_folder, refuse_irregular
-from ..io.plain import read_json
 from ..paths import results_folder
+from ..places import file_name, refuse_folder, refuse_irregular
+from ..plain import read_json
 from .page import separated
 from .run import diagnosed
 

@@ -8,9 +8,9 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
 from ..io.bench import Bench, bench_name, read_bench
-from ..io.places import file_name
 from ..io.split import split_bench
 from ..paths import results_folder
+from ..places import file_name
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import new_folder, write_corrected

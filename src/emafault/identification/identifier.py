@@ -14,7 +14,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, one_line, shown
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
-from ..io.plain import array, read_json
+from ..plain import array, read_json
 from .intervals import ConformalIntervals
 from .network import Network
 from .settings import NetworkSettings, TrainingSettings

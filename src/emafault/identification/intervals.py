@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
-from ..io.plain import array
+from ..plain import array
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io.plain import array
+from ..plain import array
 from .levenberg_marquardt import Weights, outputs
 from .settings import NetworkSettings
 

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from ..errors import InputError, shown
-from .places import refuse_irregular
+from ..places import refuse_irregular
 
 _FULL = 2**20  # bytes; a disk with less is a full one
 

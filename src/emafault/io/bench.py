@@ -13,7 +13,7 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, shown
-from .places import kind
+from ..places import kind
 from .recording import Recording, read_recording, recordings_in
 from .sensors import refuse_mistaken, useless
 

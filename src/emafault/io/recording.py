@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
+from ..places import file_at, kind
 from .atomic import replace_atomically
-from .places import file_at, kind
 
 PHASES = ("a", "b", "c")
 #: name -> (has a phase axis, unit, required, long name)

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from ..errors import InputError, shown
-from ..io.places import kind
+from ..places import kind
 from . import back_emf, dq_machine, friction_axis, induction_currents, propeller_sweep, six_step_bus, slow_rotation
 from .statement import COORDINATES, EQUATIONS, Arrays, Distortion, Machine, told
 

@@ -9,8 +9,8 @@ from typing import Any
 from ..errors import InputError, shown
 from ..io.atomic import write_text
 from ..io.bench import bench_name
-from ..io.places import file_name
 from ..paths import results_folder
+from ..places import file_name
 from ..reporting.page import Page
 from ..reporting.written import REPORT, VERDICT, checked, log_diagnosis, refuse_foreign, to_json
 from .diagnose import Diagnosed, diagnose

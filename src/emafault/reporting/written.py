@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, shown
-from ..io.places import refuse_folder, refuse_irregular, refuse_output
-from ..io.plain import read_json
 from ..paths import results_folder
+from ..places import refuse_folder, refuse_irregular, refuse_output
+from ..plain import read_json
 from ..progress import say
 
 VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"

@@ -9,12 +9,12 @@ from typing import Any
 import yaml
 
 from ..io.atomic import write_text
-from ..io.places import file_name
 from ..machines.diagnose import Diagnosed, diagnose
 from ..machines.library import build, read_cases, stated
 from ..machines.page import body, finding
 from ..machines.reconstructed import Reconstructed, reconstruct_measured
 from ..machines.withheld import Withheld, check_file, names_of
+from ..places import file_name
 from ..reporting.page import Page
 from ..reporting.written import checked
 

@@ -14,7 +14,7 @@ from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
 from ..identification.search import SearchSettings, choose, run_worker, summarise
 from ..io.atomic import write_text
-from ..io.plain import read_json
+from ..plain import read_json
 from ..progress import progress, say
 from .features import FeatureTable, read_features
 
@@ -78,7 +78,7 @@ def train_identifier(
     table = read_features(features).identified()
     settings = dict(spec)
     if chosen:
-        settings |= {key: read_json(chosen)[key] for key in ("network", "training")}
+        settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
     folder, curves = Path(history).parent, []
     seeds = range(1 if estimator == "closed_form" else settings["seeds"])
     for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):

@@ -19,8 +19,8 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.identifier import fit_identifier
 from ..io.bench import read_bench
-from ..io.plain import read_json
 from ..io.recording import Recording
+from ..plain import read_json
 from ..progress import progress, say
 from ..reconstruction import Features, join_features, reconstruct
 from ..reporting.retrained import show_in_report

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..errors import InputError, shown
+from .errors import InputError, shown
 
 LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes
 LONGEST_STEM = 150  # characters of a name that is made of another

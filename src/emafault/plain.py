@@ -7,25 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, one_line, shown
+from .errors import InputError, one_line, shown
 from .places import file_at
 
 LARGEST = 10_000_000  # bytes of a YAML file of settings; more is another kind of file
 DEEPEST, MOST = 40, 100_000  # levels and values of a YAML file
 
 
-def read_json(path: str | Path) -> Any:
-    """Read JSON.
+def read_json(path: str | Path, *needed: str) -> Any:
+    """Read JSON; where keys are needed, a mapping that has them.
 
     Raises
     ------
-    InputError : no such file, or not whole JSON
+    InputError : no such file, not whole JSON, or a needed key is missing
     """
     text = _text(path)
     try:
-        return json.loads(text)
+        read = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{shown(path)}: not JSON ({error})") from error
+    for key in needed:
+        if not isinstance(read, dict) or key not in read:
+            raise InputError(f"{shown(path)}: lacks '{key}', accepted is a mapping with {', '.join(needed)}")
+    return read
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
