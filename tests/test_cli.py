@@ -34,7 +34,7 @@ def test_simulate_writes_the_fault_and_the_overrides(folder):
 
 def test_identify_untrained_prints_a_table_and_writes_intervals(folder, tmp_path, capsys):
     out = tmp_path / "out.json"
-    nowhere = ["--results", str(tmp_path / "nowhere")]
+    nowhere = ["--results", str(tmp_path)]
     assert main(["identify", str(folder), "--json", str(out), *nowhere]) == 0
     printed = capsys.readouterr().out
     assert "faulty.nc" in printed and "dT" in printed and "closed_form" in printed
@@ -107,7 +107,7 @@ def test_refused_input_is_one_line_and_exit_code_2(folder, tmp_path, capsys, arg
     broken.write_bytes((folder / "faulty.nc").read_bytes()[:20_000])
     given = [word.format(bench=folder, broken=broken) for word in arguments]
     if given[0] == "identify":
-        given += ["--results", str(tmp_path / "nowhere")]
+        given += ["--results", str(tmp_path)]
     assert main(given) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and says in lines[0]

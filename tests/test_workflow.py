@@ -168,6 +168,7 @@ def test_another_experiment_stands_beside_and_shares_what_is_equal(house):
     ("arguments", "says"),
     [
         (["experiment=nothing"], "experiment: got 'nothing'"),
+        (["experimnt=smoke"], "experimnt: there is no such key (did you mean experiment?)"),
         (["experiment=smoke", "overrides=faults.dT.hig=90"], "faults.dT.hig"),
         (["experiment=smoke", "overrides=faults.dT.high=900"], "faults.dT.high: got 900"),
     ],

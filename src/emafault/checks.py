@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 from . import schema
 from .actuator.grammar import MACHINE, MOST_TERMS
-from .errors import InputError
+from .errors import InputError, shown
+from .places import kind
 
 _SCHEMAS = {
     "actuator": schema.Actuator,
@@ -43,16 +43,17 @@ def check_configuration(config: Mapping[str, Any]) -> None:
             raise InputError(schema.unknown_key(key, "", sorted(known)))
     for key in known - config.keys():
         raise InputError(f"{key}: is missing from the configuration")
-    for key, kind in _SCHEMAS.items():
-        schema.check(config[key], kind, key)
+    for key, expected in _SCHEMAS.items():
+        schema.check(config[key], expected, key)
+    if not isinstance(config["question"], str):
+        schema.refuse("question", config["question"], "text")
     for key in ("name", "dataset"):
-        if not all(word and set(word) <= _NAME and word[0] != "." for word in config[key].split("/")):
-            schema.refuse(key, config[key], "letters, digits, _, - and .")
+        check_name(key, config[key])
+    for variant in config["variants"]:
+        check_name("variants", variant, parts=1)
     _check_named("command", config["command"], "name", schema.COMMANDS)
-    schema.check(config["reconstruction"], dict[str, dict[str, Any]], "reconstruction")
-    for name, entry in config["reconstruction"].items():
-        _check_named(f"reconstruction.{name}", entry, "method", schema.RECONSTRUCTIONS)
-    if config["command"]["name"] == "file" and not Path(config["command"]["path"]).is_file():
+    _check_reconstruction(config["reconstruction"])
+    if config["command"]["name"] == "file" and kind(config["command"]["path"], "command.path") != "file":
         schema.refuse("command.path", config["command"]["path"], "the path of an existing file")
     _check_effects(config["effects"])
     schema.check_unlisted(config["unlisted"])
@@ -65,6 +66,8 @@ def check_configuration(config: Mapping[str, Any]) -> None:
         schema.refuse(
             "recording.duration", recording["duration"], f"a whole number of {recording['interval']} s intervals"
         )
+    if intervals > MOST_SAMPLES:
+        schema.refuse("recording.interval", recording["interval"], f"what gives up to {MOST_SAMPLES:.0e} samples")
     discards = {f"reconstruction.{name}.discard": entry["discard"] for name, entry in config["reconstruction"].items()}
     for key, discard in {"recording.discard": recording["discard"], **discards}.items():
         if discard > recording["duration"] - 0.15:
@@ -78,6 +81,41 @@ def check_configuration(config: Mapping[str, Any]) -> None:
         )
 
 
+def check_trained(config: Mapping[str, Any]) -> None:
+    """Refuse what a trained experiment's configuration says of identifying, where it does not fit.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    for key in ("actuator", "magnet", "load", "effects", "faults", "sensors", "variants"):
+        if key not in config:
+            raise InputError(f"{key}: is missing from the configuration")
+        schema.check(config[key], _SCHEMAS[key], key)
+    _check_effects(config["effects"])
+    _check_reconstruction(config.get("reconstruction"))
+
+
+def check_name(key: str, name: str, parts: int = 2) -> None:
+    """Refuse what cannot be a folder of results, and what YAML, a page or the workflow would read as something else.
+
+    Parameters
+    ----------
+    parts : how many words a name may have with a slash between them
+
+    Raises
+    ------
+    InputError : naming the key and what is accepted
+    """
+    words = name.split("/")
+    good = len(words) <= parts and all(word and set(word) <= _NAME and word[0] not in ".-" for word in words)
+    if not good or len(name) > LONGEST_NAME:
+        accepted = f"letters, digits, _, - and ., at most {LONGEST_NAME}, a letter, digit or _ first"
+        raise InputError(f"{key}: got {shown(repr(name))}, accepted are {accepted}")
+
+
+LONGEST_NAME = 100
+MOST_SAMPLES = 1e7  # of a recording, a gigabyte
 _NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.")
 
 
@@ -95,11 +133,23 @@ def _check_space(space: Mapping[str, Mapping[str, Any]]) -> None:
             if isinstance(values, Mapping):
                 if not {"low", "high"} <= set(values) <= {"low", "high", "log", "step"}:
                     schema.refuse(key, values, "a list of values, or low, high and at will log and step")
-                if values["low"] > values["high"]:
-                    schema.refuse(f"{key}.high", values["high"], f"a number not below {key}.low = {values['low']}")
-                values = [values["low"], values["high"]]
-            for value in values if isinstance(values, list) else [values]:
+                ends = [values["low"], values["high"]]
+            else:
+                ends = values if isinstance(values, list) else [values]
+            for value in ends:
                 schema.check(value, known[name].type, key, known[name].metadata)
+            if isinstance(values, Mapping) and values["low"] > values["high"]:
+                schema.refuse(f"{key}.high", values["high"], f"a number not below {key}.low = {values['low']}")
+
+
+def _check_reconstruction(entries: Any) -> None:
+    """Check every method, each by the schema of its kind."""
+    schema.check(entries, dict[str, dict[str, Any]], "reconstruction")
+    if not entries:
+        raise InputError("reconstruction: got none, accepted is one method or more")
+    for name, entry in entries.items():
+        check_name("reconstruction", name, parts=1)
+        _check_named(f"reconstruction.{name}", entry, "method", schema.RECONSTRUCTIONS)
 
 
 def _check_named(key: str, value: Mapping[str, Any], label: str, schemas: Mapping[str, type]) -> None:
@@ -116,6 +166,9 @@ def _check_effects(effects: Mapping[str, Mapping[str, float]]) -> None:
     for effect, values in effects.items():
         if effect not in EFFECTS:
             raise InputError(schema.unknown_key(effect, "effects", list(EFFECTS)))
-        for name in values:
-            if name not in EFFECTS[effect].parameters:
-                raise InputError(schema.unknown_key(name, f"effects.{effect}", list(EFFECTS[effect].parameters)))
+        for name, value in values.items():
+            key, parameters = f"effects.{effect}.{name}", EFFECTS[effect].parameters
+            if name not in parameters:
+                raise InputError(schema.unknown_key(name, f"effects.{effect}", list(parameters)))
+            low, high = parameters[name].possible
+            schema.check(value, float, key, {"low": low, "high": high, "unit": parameters[name].units})

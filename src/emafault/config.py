@@ -6,7 +6,6 @@ Only this module, the command line and the Snakefile read configuration; everyth
 import functools
 import hashlib
 import shlex
-import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -18,11 +17,19 @@ from omegaconf import OmegaConf
 
 from . import checks, schema
 from .effects import EFFECTS
-from .errors import InputError
+from .errors import InputError, one_line, shown
 from .paths import CONF
+from .places import file_at, file_name, kind
+from .plain import read_yaml
 
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
+#: keys of a composed configuration
+_KEYS = {*GROUPS, "name", "question", "dataset", "effects", "variants"}
+#: groups that diagnosing a bench reads
+DIAGNOSED = ("actuator", "sensors", "tracking")
+LONGEST_KEY = 200
+_GIVEN = "emafault_given_experiment"
 RANK_BINS = 20  # of the ranks of the check of the evidence
 #: what a dataset is for -> its place in the sequence of seeds
 PARTS = {"training": 0, "fresh": 1, "reference": 2}
@@ -32,7 +39,7 @@ def reference_actuator():
     """The nominal actuator of conf/actuator/reference.yaml."""
     from .actuator.parameters import ActuatorParameters
 
-    return ActuatorParameters(**OmegaConf.to_container(OmegaConf.load(CONF / "actuator" / "reference.yaml")))  # type: ignore[arg-type]
+    return ActuatorParameters(**read_yaml(CONF / "actuator" / "reference.yaml"))
 
 
 def experiments() -> list[str]:
@@ -53,18 +60,35 @@ def recursively_sorted(value: Any) -> Any:
 
 
 def split_overrides(overrides: str | Iterable[str] | None) -> list[str]:
-    """One string of Hydra overrides, split as a shell would; a list is taken as it is.
+    """One string of Hydra overrides, split as a shell would; a list of them is taken as it is.
 
     Raises
     ------
-    InputError : an unclosed quote
+    InputError : an unclosed quote, or neither text nor a list of texts
     """
     if isinstance(overrides, str):
         try:
             return shlex.split(overrides)
         except ValueError as error:
-            raise InputError(f"overrides: got {overrides!r}, {error}") from error
-    return [str(item) for item in overrides or []]
+            raise InputError(f"overrides: got {shown(repr(overrides))}, {error}") from error
+    if overrides is not None and (
+        not isinstance(overrides, list | tuple) or not all(isinstance(item, str) for item in overrides)
+    ):
+        raise InputError(f"overrides: got {shown(repr(overrides))}, accepted is text such as 'command=sine'")
+    return list(overrides or [])
+
+
+def refuse_unread(overrides: Iterable[str], read: Iterable[str], command: str) -> None:
+    """Refuse overrides of groups that a command does not read, which would change nothing without a word.
+
+    Raises
+    ------
+    InputError : naming the key and the groups that the command reads
+    """
+    for text in overrides:
+        key = text.lstrip("+~").split("=")[0]
+        if key.split(".")[0] not in read and key.split(".")[0] in _KEYS:
+            raise InputError(f"{shown(key)}: is not read by {command}, which accepts {', '.join(sorted(read))}")
 
 
 def compose(experiment: str = "paper", overrides: str | Iterable[str] | None = None) -> dict[str, Any]:
@@ -83,48 +107,87 @@ def compose(experiment: str = "paper", overrides: str | Iterable[str] | None = N
     ------
     InputError : an unknown key, group option or experiment, or an impossible value
     """
-    return _compose(str(experiment), tuple(split_overrides(overrides)))
+    if not isinstance(experiment, str):
+        raise InputError(f"experiment: got {shown(repr(experiment))}, accepted is a name or the path of a .yaml file")
+    texts = split_overrides(overrides)
+    keys = [text.lstrip("+~").split("=")[0] for text in texts]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise InputError(f"{shown(key)}: is overridden twice, accepted is one value")
+    return _composed(experiment, texts)
+
+
+def _composed(experiment: str, overrides: list[str]) -> dict[str, Any]:
+    """The same of overrides of which the last one counts."""
+    path, given = _experiment_file(experiment)
+    return _compose(path, path.read_text(encoding="utf-8") if given else "", tuple(overrides))
 
 
 @functools.cache
-def _compose(experiment: str, overrides: tuple[str, ...]) -> dict[str, Any]:
+def _compose(path: Path, text: str, overrides: tuple[str, ...]) -> dict[str, Any]:
+    """Compose the experiment of conf/experiment, or the one of which this is the text."""
     import hydra
+    import yaml
     from hydra.errors import HydraException
     from omegaconf.errors import OmegaConfBaseException
 
-    name, folder = _experiment_file(experiment)
-    items = [_checked_override(text) for text in overrides]
-    search = [f"hydra.searchpath=[file://{folder}]"] if folder else []
-    with hydra.initialize_config_dir(str(CONF), version_base="1.3"):
+    items = [_checked_override(item) for item in overrides]
+    with (
+        tempfile.TemporaryDirectory(prefix="emafault-") as folder,
+        hydra.initialize_config_dir(str(CONF), version_base="1.3"),
+    ):
+        chosen = [f"experiment={path.stem}"]
+        if text:  # under a name of our own, since Hydra reads null, 1 or a=b in names
+            (Path(folder) / "experiment").mkdir()
+            (Path(folder) / "experiment" / f"{_GIVEN}.yaml").write_text(text, encoding="utf-8")
+            chosen = [f"experiment={_GIVEN}", f"hydra.searchpath=['file://{folder}']"]
         try:
-            composed = hydra.compose("config", overrides=[f"experiment={name}", *search, *items])
+            composed = hydra.compose("config", overrides=[*chosen, *items])
             config: Any = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
-        except (HydraException, OmegaConfBaseException) as error:
-            raise InputError(_one_line(error, name, search, overrides)) from error
-        finally:
-            if folder:
-                shutil.rmtree(folder, ignore_errors=True)
-    config["name"] = config["name"] or name
-    config["dataset"] = config["dataset"] or name
+        except (HydraException, OmegaConfBaseException, yaml.YAMLError, RecursionError, ValueError) as error:
+            about = f"{shown(path)}: " if text and not overrides else ""
+            said = _list_for_mapping(path, text) or _one_line(error, chosen, overrides)
+            raise InputError(about + said.replace(_GIVEN, path.stem)) from error
+    config["name"] = config["name"] or path.stem
+    config["dataset"] = config["dataset"] or path.stem
     checks.check_configuration(config)
     return recursively_sorted(config) | {"variants": config["variants"]}  # variants keep their order
 
 
-def _experiment_file(experiment: str) -> tuple[str, str | None]:
-    """Name of an experiment, and for one given as a path a temporary folder in which Hydra finds it."""
-    if not experiment.endswith((".yaml", ".yml")):
-        if experiment not in experiments():
-            raise InputError(
-                f"experiment: got '{experiment}', accepted are {', '.join(experiments())} or the path of a .yaml file"
-            )
-        return experiment, None
-    path = Path(experiment)
-    if not path.is_file():
-        raise InputError(f"experiment: {path}: no such file")
-    folder = Path(tempfile.mkdtemp(prefix="emafault-"))
-    (folder / "experiment").mkdir()
-    shutil.copy(path, folder / "experiment" / f"{path.stem}.yaml")
-    return path.stem, str(folder)
+def _experiment_file(experiment: str) -> tuple[Path, bool]:
+    """The file of an experiment, checked, and whether it was given as a path."""
+    given = experiment.endswith((".yaml", ".yml"))
+    if not given and experiment not in experiments():
+        named = f"experiment: got '{shown(experiment)}'"
+        raise InputError(f"{named}, accepted are {', '.join(experiments())} or the path of a .yaml file")
+    path = file_at(experiment, "experiment") if given else CONF / "experiment" / f"{experiment}.yaml"
+    checks.check_name(f"experiment: {shown(path)}: its name", path.stem, parts=1)
+    read = read_yaml(path)
+    defaults = read.get("defaults", [])
+    if not isinstance(defaults, list) or not all(isinstance(entry, str | dict) for entry in defaults):
+        raise InputError(
+            f"{shown(path)}: defaults: got {shown(repr(defaults))}, accepted is a list of words and options"
+        )
+    chosen = [key for entry in defaults if isinstance(entry, dict) for key in entry]
+    for key in chosen:
+        if chosen.count(key) > 1:
+            raise InputError(f"{shown(path)}: defaults: {shown(key)} is chosen twice, accepted is one option")
+    for key in _unset(read):
+        raise InputError(f"{shown(path)}: {key}: needs a value")
+    if "hydra" in read:
+        raise InputError(f"{shown(path)}: hydra: is not a key of an experiment")
+    return path, given
+
+
+def _unset(read: Mapping[str, Any], above: str = "") -> list[str]:
+    """Keys that stand without a value."""
+    found = []
+    for key, value in read.items():
+        if value == "???":
+            found.append(f"{above}{key}")
+        elif isinstance(value, Mapping):
+            found += _unset(value, f"{above}{key}.")
+    return found
 
 
 def _checked_override(text: str) -> str:
@@ -135,16 +198,23 @@ def _checked_override(text: str) -> str:
     try:
         (item,) = OverridesParser.create().parse_overrides([text])
     except HydraException as error:
-        raise InputError(f"override {text!r}: cannot be read, accepted is key=value or group=option") from error
+        raise InputError(
+            f"override {shown(repr(text))}: cannot be read, accepted is key=value or group=option"
+        ) from error
     key = item.key_or_group
+    if not key or len(key) > LONGEST_KEY:
+        raise InputError(f"override {shown(repr(text))}: has no key that there could be, accepted is key=value")
+    if item.package is not None or key.split(".")[0].split("/")[0] == "hydra":
+        raise InputError(f"{shown(text)}: packages and Hydra's own keys are not accepted, key=value or group=option is")
     if item.is_sweep_override():
         raise InputError(f"{key}: got the sweep {text!r}, accepted is one value; a study's variants are an experiment")
     if key == "experiment":
-        raise InputError("experiment: is chosen by itself (experiment=NAME beside overrides), not as an override")
+        how = "--experiment NAME, or experiment=NAME beside overrides"
+        raise InputError(f"experiment: is chosen by itself ({how}), not as an override")
     if key in GROUPS and not item.is_delete():
         options = sorted(p.stem for p in (CONF / key).glob("*.yaml"))
         chosen = item.value()
-        for option in chosen if isinstance(chosen, list) else [chosen]:
+        for option in chosen if isinstance(chosen, list) and key == "reconstruction" else [chosen]:
             if option not in options:
                 raise InputError(f"{key}: got {option!r}, accepted is {', '.join(options)}")
     if key.startswith("effects.") and not text.startswith(("+", "~")):
@@ -152,15 +222,40 @@ def _checked_override(text: str) -> str:
     return text
 
 
-def _one_line(error: Exception, name: str, search: list[str], overrides: tuple[str, ...]) -> str:
-    """Hydra's refusal as one line; an unknown key is answered with the keys there are."""
+def _list_for_mapping(path: Path, text: str) -> str:
+    """What refuses an experiment that puts a list where keys are accepted, of which Hydra does not say where."""
     from hydra import compose as hydra_compose
 
+    read: Any = OmegaConf.to_container(OmegaConf.create(text or path.read_text(encoding="utf-8")))
+    pending: list[tuple[str, Any, Any]] = [("", read, OmegaConf.to_container(hydra_compose("config")))]
+    while pending:
+        above, read, base = pending.pop()
+        for name, value in read.items():
+            below = base.get(name)
+            if isinstance(below, dict):
+                key = f"{above}{name}"
+                if isinstance(value, list):
+                    return f"{key}: got {shown(repr(value))}, accepted is a mapping with {', '.join(map(str, below))}"
+                if isinstance(value, dict):
+                    pending.append((f"{key}.", value, below))
+    return ""
+
+
+def _one_line(error: Exception, chosen: list[str], overrides: tuple[str, ...]) -> str:
+    """Hydra's refusal as one line; an unknown key is answered with the keys there are."""
+    from hydra import compose as hydra_compose
+    from hydra.errors import HydraException
+
+    if isinstance(error, RecursionError):
+        return "defaults: refer to themselves, accepted are other files"
     if getattr(error, "full_key", None) and "Missing mandatory value" in str(error):
         key = error.full_key  # type: ignore[attr-defined]
         return f"{key}: needs a value, accepted is {key}=VALUE"
     groups = [text for text in overrides if text.split("=")[0] in GROUPS]
-    base = hydra_compose("config", overrides=[f"experiment={name}", *search, *groups])
+    try:
+        base = hydra_compose("config", overrides=[*chosen, *groups])
+    except HydraException:  # the experiment itself is what is wrong
+        return one_line(error)
     for text in overrides:
         words, node = text.lstrip("+~").split("=")[0].split("."), base
         for depth, word in enumerate(words):
@@ -169,7 +264,7 @@ def _one_line(error: Exception, name: str, search: list[str], overrides: tuple[s
             if word not in node:
                 return schema.unknown_key(".".join(words[depth:]), ".".join(words[:depth]), [str(k) for k in node])
             node = OmegaConf.select(base, ".".join(words[: depth + 1]))
-    return " ".join(str(error).split())
+    return one_line(error)
 
 
 # --- stages --------------------------------------------------------------------------------------------------------
@@ -290,7 +385,7 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
 
 def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     """What diagnosing a bench reads."""
-    return recursively_sorted(_pick(config, "actuator", "sensors", "tracking"))
+    return recursively_sorted(_pick(config, *DIAGNOSED))
 
 
 def _most_accurate(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -317,24 +412,56 @@ def retraining_spec(config: Mapping[str, Any]) -> dict[str, Any]:
 def bench_name(bench: str) -> str:
     """Name under which a bench's diagnosis stands among the results."""
     path = Path(bench)
-    return (path.resolve().name if path.is_dir() else path.stem) or "none"
+    return file_name((path.resolve().name if path.is_dir() else path.stem) or "none")
 
 
 def bench_files(bench: str) -> list[str]:
-    """Files of a bench, in order of name.
+    """Files of a bench, in order of name, for the workflow.
 
     Raises
     ------
-    InputError : no bench given, or a path that does not exist
+    InputError : no bench given, a path that does not exist, or one with braces, which Snakemake reads as wildcards
     """
-    path = Path(bench)
     if not bench:
         raise InputError("bench: none given, --config bench=PATH names a folder of recordings")
-    if path.is_dir():
-        return sorted(str(p) for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
-    if not path.is_file():
-        raise InputError(f"bench: {bench}: no such file or folder")
-    return [bench]
+    found = kind(bench, "bench")
+    if found not in ("file", "folder"):
+        raise InputError(f"bench: {shown(bench)}: no such file or folder")
+    files = [bench]
+    if found == "folder":
+        files = sorted(str(p) for p in Path(bench).iterdir() if p.is_file() and not p.name.startswith("."))
+    for file in files:
+        if set(file) & set("{}"):
+            raise InputError(f"bench: {shown(file)}: the workflow accepts no braces, emafault diagnose does")
+    return files
+
+
+#: what ``snakemake --config`` may set
+CALL = ("experiment", "overrides", "bench", "twin")
+
+
+def check_call(call: Mapping[str, Any]) -> None:
+    """Refuse what a call of the workflow sets, before anything runs.
+
+    Parameters
+    ----------
+    call : what stands behind ``snakemake --config``
+
+    Raises
+    ------
+    InputError : a key that nothing reads, or a bench or machine that there is not
+    """
+    for key, value in call.items():
+        if key not in CALL:
+            raise InputError(schema.unknown_key(key, "", CALL).replace("the configuration", "--config"))
+        if key in ("bench", "twin") and not isinstance(value, str):
+            raise InputError(f"{key}: got {shown(repr(value))}, accepted is one word")
+    if call.get("bench"):
+        bench_files(call["bench"])
+    if call.get("twin", "actuator") != "actuator":
+        from .machines.library import stated
+
+        stated(call["twin"])
 
 
 def withheld_draws() -> list[str]:
@@ -344,7 +471,7 @@ def withheld_draws() -> list[str]:
 
 def _withheld_draw(draw: str) -> dict[str, Any]:
     """A draw of conf/withheld."""
-    return OmegaConf.to_container(OmegaConf.load(CONF / "withheld" / f"{draw}.yaml"))  # type: ignore[return-value]
+    return read_yaml(CONF / "withheld" / f"{draw}.yaml")
 
 
 def check_draws() -> None:
@@ -410,7 +537,7 @@ def _evidence() -> dict[str, Any]:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    read: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(CONF / "evidence.yaml"))  # type: ignore[assignment]
+    read = read_yaml(CONF / "evidence.yaml")
     schema.check(read, schema.Evidence, "evidence")
     if not read["benches"]:
         schema.refuse("evidence.benches", read["benches"], "a list of one seed or more")
@@ -474,7 +601,7 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     texts = split_overrides(overrides)
     top = compose(experiment, texts)
     if top["variants"]:
-        configs = {f"{top['name']}/{v}": compose(experiment, [*texts, *more]) for v, more in top["variants"].items()}
+        configs = {f"{top['name']}/{v}": _composed(experiment, [*texts, *more]) for v, more in top["variants"].items()}
     else:
         configs = {top["name"]: top}
     cases: list[Case] = []

@@ -19,9 +19,11 @@ from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
 from .io.atomic import replace_atomically, write_text
 from .io.recording import PHASES, VARIABLES, Recording
+from .places import file_at
 from .progress import progress, say
 
 BLOCK = 25  # runs simulated, written and read at a time
+FASTEST = 5.0  # times the speed at which the back-EMF of a phase is the bus voltage
 CHUNK_CACHE = 2**20  # bytes a variable; chunks are written and read whole, the library's 16 MB would only fill up
 
 
@@ -116,6 +118,7 @@ def simulate_blocks(
         rows = slice(start, min(start + BLOCK, last))
         runs = sample.records(rows)
         signals = simulate_and_measure(spec, runs, command, duration, interval, start)
+        _refuse_runaway(signals, spec["actuator"])
         yield Block(start, interval, signals, sample.faults[rows])
 
 
@@ -145,6 +148,19 @@ def simulate_and_measure(
     terms = in_machine(unlisted, len(runs), seed, first_run, recording)
     signals = simulate(runs, command, duration, interval, terms=terms)
     return measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
+
+
+def _refuse_runaway(signals: Mapping[str, np.ndarray], actuator: Mapping[str, Any]) -> None:
+    """Refuse simulated signals that are no numbers, or speeds (rad/s) far above what the bus voltage can drive."""
+    why = "a load, an effect or a parameter of the actuator is impossible"
+    for name, values in signals.items():
+        if not np.all(np.isfinite(values)):
+            raise InputError(f"{name}: would hold NaN or infinite values; {why}")
+    largest = FASTEST * actuator["bus_voltage"] / actuator["back_emf"]
+    reached = float(np.max(np.abs(signals["rotor_speed"])))
+    if reached > largest:
+        accepted = f"accepted is up to {largest:.3g} rad/s, {FASTEST:g} times what the bus voltage can drive"
+        raise InputError(f"rotor_speed: would reach {reached:.3g} rad/s, {accepted}; {why}")
 
 
 def simulate_shard(path: str | Path, spec: Mapping[str, Any], shard: int) -> None:
@@ -257,8 +273,7 @@ def read_blocks(paths: Sequence[str | Path], names: Sequence[str] | None = None)
     import netCDF4
 
     for path in map(Path, paths):
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
+        file_at(path)
         try:
             with netCDF4.Dataset(path) as file:
                 missing = [n for n in ("time", "fault", "ambient_temperature", *VARIABLES) if n not in file.variables]

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import BinaryIO, TypeVar
 
-from .errors import InputError
+from .errors import InputError, one_line
 
 T = TypeVar("T")
 
@@ -45,7 +45,7 @@ def one_line_errors(log: str) -> Iterator[None]:
                 raise InputError(f"{log}: cannot be written ({error.strerror})") from error
             yield
         except InputError as error:
-            say(f"emafault: {' '.join(str(error).split())}")
+            say(f"emafault: {one_line(error)}")
             raise SystemExit(2) from None
         except OSError as error:  # a disk that is full or a folder that is read-only shows itself anywhere
             say(f"emafault: {error.filename or 'a file'}: cannot be used ({error.strerror or error})")

@@ -1,31 +1,14 @@
-"""What the workflow runs, as digests of sources, and where it may write."""
+"""What the workflow runs, as digests of sources, and the claim on where it writes."""
 
 import ast
 import fcntl
 import functools
 import hashlib
-import os
 from pathlib import Path
 from typing import IO
 
 from .errors import InputError
 from .paths import EFFECTS, PACKAGE
-
-
-def check_writable(folder: str | Path) -> None:
-    """Refuse, before anything runs, results that cannot be written.
-
-    Raises
-    ------
-    InputError : the folder is a file, or is read-only
-    """
-    path = Path(folder)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{path}: is not a folder, results cannot be written there")
-    nearest = next(p for p in (path, *path.absolute().parents) if p.exists())
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: is read-only, results cannot be written there")
-
 
 _claims: list[IO[str]] = []  # held as long as the process lives
 

@@ -10,13 +10,13 @@ import difflib
 import math
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
 from typing import Any
 
 from .actuator import grammar
 from .actuator.parameters import ECCENTRICITY_LAWS, ActuatorParameters
-from .errors import InputError
+from .errors import InputError, shown
 
 
 def number(low: float = -math.inf, high: float = math.inf, unit: str = "") -> Any:
@@ -36,16 +36,34 @@ def group() -> Any:
 
 #: smallest number that still counts as positive
 POSITIVE = 1e-12
-_MAY_BE_ZERO = {"viscous_friction", "coulomb_friction", "backlash", "switch_resistance", "diode_voltage"}
-_ANY_SIGN = {"reference_temperature"}
-
-
-def _actuator_field(name: str, kind: type) -> tuple[str, type, Any]:
-    low = -math.inf if name in _ANY_SIGN else 0.0 if name in _MAY_BE_ZERO else POSITIVE
-    return name, kind, number(1 if name in ("pole_pairs", "static_over_coulomb", "gear_ratio") else low)
-
-
-Actuator = make_dataclass("Actuator", [_actuator_field(f.name, f.type) for f in fields(ActuatorParameters)])  # type: ignore[arg-type]
+#: what the parameters of an actuator may be; beyond it a simulation would take for ever or mean nothing
+_ACTUATOR: dict[str, tuple[float, float, str]] = {
+    "bus_voltage": (POSITIVE, 1e4, "V"),
+    "resistance": (POSITIVE, 1e4, "ohm"),
+    "inductance": (1e-6, 10.0, "H"),
+    "back_emf": (POSITIVE, 100.0, "V s/rad"),
+    "pole_pairs": (1, 100, ""),
+    "inertia": (POSITIVE, 100.0, "kg m2"),
+    "viscous_friction": (0.0, 100.0, "N m s/rad"),
+    "coulomb_friction": (0.0, 1e4, "N m"),
+    "static_over_coulomb": (1.0, 10.0, ""),
+    "gear_ratio": (1.0, 1e5, ""),
+    "backlash": (0.0, 1.0, "rad"),
+    "end_stop": (POSITIVE, 1e4, "rad"),
+    "current_limit": (POSITIVE, 1e4, "A"),
+    "speed_limit": (POSITIVE, 1e5, "rad/s"),
+    "position_gain": (POSITIVE, 1e5, "1/s"),
+    "speed_gain": (POSITIVE, 1e4, "A s/rad"),
+    "speed_integral_gain": (POSITIVE, 1e6, "A/rad"),
+    "hysteresis": (1e-3, 1e3, "A"),
+    "switch_resistance": (0.0, 100.0, "ohm"),
+    "diode_voltage": (0.0, 100.0, "V"),
+    "copper_coefficient": (POSITIVE, 0.1, "1/K"),
+    "reference_temperature": (-273.15, 500.0, "degC"),
+    "control_period": (1e-6, 1e-2, "s"),
+}
+_parameters = [(f.name, f.type, number(*_ACTUATOR[f.name])) for f in fields(ActuatorParameters)]
+Actuator = make_dataclass("Actuator", _parameters)  # type: ignore[arg-type]
 
 
 @dataclass
@@ -270,7 +288,9 @@ def check(value: Any, schema: Any, key: str, metadata: Mapping = types.MappingPr
         if not isinstance(value, dict):
             refuse(key, value, "a mapping")
         for name, item in value.items():
-            check(item, arguments[1], f"{key}.{name}", metadata)
+            if not isinstance(name, str):
+                refuse(key, name, "keys that are words")
+            check(item, arguments[1], f"{key}.{shown(name)}", metadata)
     elif schema is Any:
         pass
     elif schema is bool:
@@ -279,7 +299,7 @@ def check(value: Any, schema: Any, key: str, metadata: Mapping = types.MappingPr
     elif schema in (int, float):
         low, high = metadata.get("low", -math.inf), metadata.get("high", math.inf)
         is_number = isinstance(value, int if schema is int else (int, float)) and not isinstance(value, bool)
-        if not (is_number and math.isfinite(value) and low <= value <= high):
+        if not (is_number and low <= value <= high and abs(value) != math.inf):
             refuse(key, value, _accepted_number(schema, low, high, metadata.get("unit", "")))
     elif schema is str:
         accepted = metadata.get("accepted")
@@ -345,14 +365,14 @@ def _check_parameter(value: Any, name: str, place: str, form: str, key: str) -> 
 
 def refuse(key: str, got: Any, accepted: str) -> typing.NoReturn:
     """Raise the one line that names a key, what it got and what it accepts."""
-    raise InputError(f"{key}: got {got!r}, accepted is {accepted}")
+    raise InputError(f"{key}: got {shown(repr(got))}, accepted is {accepted}")
 
 
-def unknown_key(name: str, parent: str, known: Mapping | list[str]) -> str:
+def unknown_key(name: object, parent: str, known: Iterable[str]) -> str:
     """The one line that refuses a key that does not exist."""
     close = difflib.get_close_matches(str(name), list(known), 1)
     hint = f" (did you mean {close[0]}?)" if close else ""
-    full = f"{parent}.{name}" if parent else name
+    full = f"{parent}.{shown(name)}" if parent else shown(name)
     return f"{full}: there is no such key{hint}; {parent or 'the configuration'} accepts {', '.join(sorted(known))}"
 
 

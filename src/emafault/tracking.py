@@ -18,6 +18,7 @@ from typing import Any
 
 from . import __version__
 from .errors import InputError
+from .places import kind
 
 _SQLITE = "sqlite:///"
 _LONGEST_VALUE = 6000
@@ -136,6 +137,7 @@ def _client(uri: str) -> Iterator[Any]:
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     from mlflow import MlflowClient
     from mlflow.exceptions import MlflowException
+    from sqlalchemy.exc import SQLAlchemyError
 
     for name in ("mlflow", "alembic"):  # what goes wrong is raised too; the import sets levels of its own
         logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -144,10 +146,12 @@ def _client(uri: str) -> Iterator[Any]:
         try:
             if uri.startswith(_SQLITE):
                 path = Path(uri.removeprefix(_SQLITE))
+                if kind(path, "tracking.uri") not in ("", "file"):  # MLflow tries for minutes to open it
+                    raise InputError(f"tracking.uri: {uri} cannot be used (not a file)")
                 path.parent.mkdir(parents=True, exist_ok=True)
                 lock = stack.enter_context(open(path.with_name(f".{path.name}.lock"), "w"))
                 fcntl.flock(lock, fcntl.LOCK_EX)
             yield MlflowClient(tracking_uri=uri)
-        except (MlflowException, OSError) as error:
+        except (MlflowException, SQLAlchemyError, OSError) as error:
             reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())
             raise InputError(f"tracking.uri: {uri} cannot be used ({reason[:300]})") from error

@@ -100,7 +100,7 @@ def test_broken_or_missing_files_are_refused_in_one_line(fitted, tmp_path):
     fitted["closed_form"].identifier.save(tmp_path)
     text = (tmp_path / "identifier.json").read_text()
     (tmp_path / "identifier.json").write_text(text[: len(text) // 2])
-    with pytest.raises(InputError, match="not a saved identifier"):
+    with pytest.raises(InputError, match="not JSON"):
         Identifier.load(tmp_path)
 
 

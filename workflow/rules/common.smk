@@ -7,15 +7,17 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from emafault import config as configuration
 from emafault import provenance
-from emafault.errors import InputError
+from emafault.errors import InputError, one_line
+from emafault.places import refuse_folder
 
 RESULTS = "results"
 
 try:
+    configuration.check_call(config)
     PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
-    provenance.check_writable(RESULTS)
+    refuse_folder(RESULTS)
 except InputError as error:
-    sys.exit(f"emafault: {error}")
+    sys.exit(f"emafault: {one_line(error)}")
 
 EXPERIMENT = f"{RESULTS}/experiments/{PLAN.name}"
 CASE = f"{RESULTS}/experiments/{{case}}"
@@ -50,7 +52,7 @@ onstart:
     try:
         provenance.claim(RESULTS)
     except InputError as error:
-        sys.exit(f"emafault: {error}")
+        sys.exit(f"emafault: {one_line(error)}")
 
 
 # --- datasets and features ---
@@ -188,7 +190,7 @@ def bench_files(wildcards):
     try:
         return configuration.bench_files(BENCH)
     except InputError as error:
-        sys.exit(f"emafault: {error}")
+        sys.exit(f"emafault: {one_line(error)}")
 
 
 def withheld_measured(wildcards):

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, one_line, shown
+from ..places import file_at
 
+LARGEST_POSITION = 100.0  # rad of a commanded position
 CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner
 JUMP = 20.0  # times the rises beside it, from which a rise of a recorded command is a jump
 LEAST_JUMP = 5e-4  # rad
@@ -83,19 +85,20 @@ def read_command(path: str | Path, duration: float, control_period: float) -> np
     ------
     InputError : a missing or unreadable file, or time that does not increase
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"command file {path}: no such file")
+    what = "command file"
+    path = file_at(path, what)
     try:
-        text = path.read_text().replace(",", " ").splitlines()
+        text = path.read_text(encoding="utf-8").replace(",", " ").splitlines()
         rows = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
         if rows and not rows[0].split()[0].replace(".", "").replace("-", "").replace("e", "").isdigit():
             rows = rows[1:]
-        table = np.loadtxt(rows, ndmin=2)
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"command file {path}: not a table of numbers ({error})") from error
-    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or np.any(np.diff(table[:, 0]) <= 0):
-        raise InputError(f"command file {path}: two columns, increasing time (s) and position (rad), are accepted")
+        table = np.array([[float(cell) for cell in row.split()] for row in rows])
+    except (ValueError, OSError) as error:
+        raise InputError(f"{what} {shown(path)}: not a table of numbers ({one_line(error)})") from error
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or not np.all(np.diff(table[:, 0]) > 0):
+        raise InputError(f"{what} {shown(path)}: two columns, increasing time (s) and position (rad), are accepted")
+    if not np.all(np.abs(table[:, 1]) <= LARGEST_POSITION):
+        raise InputError(f"{what} {shown(path)}: positions up to {LARGEST_POSITION:g} rad are accepted")
     return resample(table[:, 0], table[:, 1], duration, control_period)
 
 

@@ -66,7 +66,7 @@ def measure(
     out["ambient_temperature"] = runs["reference_temperature"] + runs["dT"]
     for r in range(len(runs)):
         rng = np.random.Generator(np.random.SFC64([seed, first_run + r]))
-        own = {name: out[name][r] for name in _CHANNEL if name in out}
+        own = {name: out[name][r] for name in CHANNEL if name in out}
         chain = Chain(unlisted, runs[r], interval, seed, first_run + r, recording) if changed else None
         if chain:
             chain.before_noise(own)

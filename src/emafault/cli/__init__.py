@@ -5,6 +5,9 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
+
+from ..errors import InputError, one_line, shown
 
 # before NumPy is imported: with more threads small linear algebra is many times slower
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -20,10 +23,24 @@ COMMANDS = {
 }
 
 
+class _Parser(argparse.ArgumentParser):
+    """Refuses in one line, as everything else does."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {shown(message, 400)} ({self.prog} --help)\n")
+
+
+def whole_number(text: str) -> int:
+    """A seed: what ``type`` of an argument makes of its text."""
+    if not (text.isascii() and text.isdigit() and int(text[:20]) <= 2**31):
+        raise argparse.ArgumentTypeError(f"got '{shown(text)}', accepted is an integer from 0 to {2**31}")
+    return int(text)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a subcommand; 0 if it did what was asked, 2 with one line on refused input."""
+    """Run a subcommand; 0 if it did what was asked, 2 with one line on refused input, 1 on a fault of the program."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    parser = argparse.ArgumentParser(prog="emafault", description=importlib.import_module("emafault").__doc__)
+    parser = _Parser(prog="emafault", description=importlib.import_module("emafault").__doc__)
     parser.add_argument(
         "--version", action="version", version=f"emafault {importlib.import_module('emafault').__version__}"
     )
@@ -34,15 +51,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
             importlib.import_module(f"{__name__}.{name}").arguments(sub)
     args, rest = parser.parse_known_args(given)
     if rest and (not hasattr(args, "overrides") or any(word.startswith("-") for word in rest)):
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        subparsers.choices[args.command].error(f"unrecognized arguments: {shown(' '.join(rest))}")
     if rest:  # overrides that follow an option
         args.overrides += rest
-
-    from ..errors import InputError
-
     try:
         importlib.import_module(f"{__name__}.{args.command}").run(args)
+        sys.stdout.flush()
     except InputError as error:
-        print(f"emafault {args.command}: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"emafault {args.command}: {one_line(error)}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # whoever read what is printed has read enough
+        sys.stdout = open(os.devnull, "w")
+        return 0
+    except KeyboardInterrupt:
+        print(f"emafault {args.command}: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        if os.environ.get("EMAFAULT_TRACEBACK"):
+            raise
+        text = f"{type(error).__name__}: {shown(error)}"
+        remedy = "EMAFAULT_TRACEBACK=1 shows where; please report it with that and the command"
+        print(f"emafault {args.command}: a fault of emafault, not of its input: {text}; {remedy}", file=sys.stderr)
+        return 1
     return 0

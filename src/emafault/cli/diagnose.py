@@ -29,6 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--corrected", metavar="DIR", help="write the recordings with the faults of their measuring chain undone to DIR"
     )
+    parser.add_argument("--force", action="store_true", help="replace files that are not of this bench's diagnosis")
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
 
@@ -40,19 +41,25 @@ def run(args: argparse.Namespace) -> None:
     InputError : recordings, a twin or a setting that cannot be used
     """
     from .. import config
-    from ..errors import InputError
+    from ..checks import LONGEST_NAME
+    from ..errors import InputError, shown
+    from ..reporting.written import refuse_experiment
 
+    actuator = args.twin == "actuator"
+    config.refuse_unread(args.overrides, config.DIAGNOSED if actuator else ("tracking",), "diagnose")
     target = None
     if args.experiment:
-        if not args.experiment.replace("_", "").replace("-", "").isalnum():
-            raise InputError(f"--experiment: got '{args.experiment}', accepted are letters, digits, _ and -")
-        target = config.CONF / "experiment" / f"{args.experiment}.yaml"
+        word = args.experiment
+        if not (word.isascii() and word.replace("_", "").replace("-", "").isalnum()) or len(word) > LONGEST_NAME:
+            raise InputError(f"--experiment: got '{shown(word)}', accepted are letters, digits, _ and -")
+        target = config.CONF / "experiment" / f"{word}.yaml"
+        refuse_experiment(target)
     spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
     tracking = not args.no_tracking
-    if args.twin == "actuator":
+    if actuator:
         from ..equations.run import diagnose_folder
 
-        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, args.corrected)
+        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, args.corrected, args.force)
         if args.corrected:
             print(identified(args.path, args.corrected))
     else:
@@ -62,7 +69,7 @@ def run(args: argparse.Namespace) -> None:
             raise InputError("--experiment: a measured machine has no simulator that could run one")
         from ..machines.run import diagnose_file
 
-        diagnose_file(args.path, args.twin, spec, args.out, args.exclude, tracking)
+        diagnose_file(args.path, args.twin, spec, args.out, args.exclude, tracking, args.force)
     if target is not None:
         print(f"snakemake --cores all --config experiment={Path(target).stem}")
 

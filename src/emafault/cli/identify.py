@@ -3,6 +3,8 @@
 import argparse
 import sys
 
+from ..errors import shown
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -22,6 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="such as weighted/network or paper/closed_form; the most accurate of the experiment unless given",
     )
     parser.add_argument("--level", type=float, default=0.9, help="of the intervals (0.9)")
+    parser.add_argument("--force", action="store_true", help="replace the file of --json if it exists")
     parser.add_argument("--results", metavar="DIR", help="folder of results (results here, else the project's)")
 
 
@@ -37,34 +40,36 @@ def run(args: argparse.Namespace) -> None:
     from ..identification.recordings import identify_recordings
     from ..io.atomic import write_text
     from ..io.recording import read_recording, recordings_in
+    from ..places import refuse_output
     from .model import load_model
 
+    paths, healthy = recordings_in(args.files), recordings_in(args.reference)
+    if args.json is not None:
+        refuse_output(args.json, "--json", read=[*paths, *healthy], force=args.force)
     model = load_model(args.experiment, args.method, args.results)
-    paths = recordings_in(args.files)
-    reference = [read_recording(path) for path in recordings_in(args.reference)]
+    reference = [read_recording(path) for path in healthy]
     found = identify_recordings(model, [read_recording(path) for path in paths], reference, args.level)
     result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
-    if args.json:
-        text = json.dumps(result, indent=1)
-        write_text(args.json, text + "\n")
     print(table(result, args.level))
     unit = f"calibrated on {len(reference)} healthy recording(s)" if reference else "taken for nominal (no --reference)"
     print(f"experiment {args.experiment}, method {model.name}, unit {unit}")
     for path, note in zip(paths, found.notes):
         if note:
-            print(f"{path}: {note}", file=sys.stderr)
+            print(f"{shown(path)}: {note}", file=sys.stderr)
+    if args.json is not None:
+        write_text(args.json, json.dumps(result, indent=1) + "\n")
 
 
 def table(result: dict, level: float) -> str:
     """Estimates and intervals as aligned text."""
     from ..faults import FAULT_NAMES
 
-    width = max(len("file"), *(len(name) for name in result))
+    width = max(len("file"), *(len(shown(name)) for name in result))
     lines = [f"{'file':{width}} " + " ".join(f"{name:>28}" for name in FAULT_NAMES)]
     for name, estimate in result.items():
         cells = []
         for component in FAULT_NAMES:
             e, digits = estimate[component], 2 if component == "dT" else 4
             cells.append(f"{e['value']:9.{digits}f} [{e['low']:7.{digits}f}, {e['high']:7.{digits}f}]")
-        lines.append(f"{name:{width}} " + " ".join(f"{cell:>28}" for cell in cells))
+        lines.append(f"{shown(name):{width}} " + " ".join(f"{cell:>28}" for cell in cells))
     return "\n".join([*lines, f"in brackets {100 * level:.0f} % intervals; N and xi in 1, dT in K above 20 degC"])

@@ -1,6 +1,6 @@
 """Which estimator ``emafault identify`` uses: a trained experiment's, or the closed form where none was trained."""
 
-import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from .. import checks, schema
 from .. import config as configuration
 from ..actuator.parameters import ActuatorParameters
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..identification.identifier import Identifier
 from ..identification.intervals import ConformalIntervals
 from ..identification.recordings import Model
 from ..paths import results_folder
+from ..places import kind
+from ..plain import read_json, read_yaml
 
 
 def load_model(experiment: str, choice: str | None = None, results: str | Path | None = None) -> Model:
@@ -32,8 +35,11 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
     """
     if results is None:
         results = results_folder()
+    elif kind(results, "--results") != "folder":
+        raise InputError(f"--results: {shown(results)}: no such folder, accepted is one of results (results)")
+    checks.check_name("experiment", experiment)
     folder = Path(results) / "experiments" / experiment
-    trained = (folder / "configuration.yaml").is_file()
+    trained = os.path.lexists(folder / "configuration.yaml")
     config = _read_configuration(folder / "configuration.yaml") if trained else configuration.compose(experiment)
     if config.get("variants") and not trained:
         raise InputError(
@@ -49,7 +55,7 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
         hint = (
             "" if trained else f"; '{experiment}' is not trained here, snakemake --config experiment={experiment} does"
         )
-        raise InputError(f"--method: got '{choice}', accepted are {', '.join(sorted(known))}{hint}")
+        raise InputError(f"--method: got '{shown(choice)}', accepted are {', '.join(sorted(known))}{hint}")
     reconstruction, estimator = name.split("/")
     settings = dict(methods[reconstruction])
     saved = folder / "identifiers" / reconstruction / estimator / "seed_0"
@@ -72,23 +78,42 @@ def untrained_closed_form(config: Mapping[str, Any]) -> Identifier:
 
 
 def _read_configuration(path: Path) -> dict[str, Any]:
-    from omegaconf import OmegaConf
-
+    config = read_yaml(path)
     try:
-        config = OmegaConf.to_container(OmegaConf.load(path))
-    except Exception as error:  # whatever the YAML reader raises
-        raise InputError(f"{path}: not a readable configuration ({' '.join(str(error).split())})") from error
-    if not isinstance(config, dict) or "reconstruction" not in config:
-        raise InputError(f"{path}: not the configuration of an experiment")
-    return {str(key): value for key, value in config.items()}
+        checks.check_trained(config)
+    except InputError as error:
+        raise InputError(f"{shown(path)}: {error}") from None
+    return config
 
 
 def _most_accurate(folder: Path, config: Mapping[str, Any], known: set[str]) -> str:
     """The trained estimator with the smallest error over range on fresh rows; without an evaluation the closed form."""
-    try:
-        results = json.loads((folder / "evaluation" / "metrics.json").read_text())["results"]
-        errors = {f"{r['method']}/{r['estimator']}": r["all"]["errors.mean.over_range"]["mean"] for r in results}
-        return min((name for name in errors if name in known), key=lambda name: errors[name])
-    except (OSError, ValueError, KeyError):
+    path = folder / "evaluation" / "metrics.json"
+    if not os.path.lexists(path):
         methods = list(config["reconstruction"])
         return f"{'weighted_floating' if 'weighted_floating' in methods else methods[-1]}/closed_form"
+    errors = _errors(path, read_json(path))
+    return min((name for name in errors if name in known), key=lambda name: errors[name])
+
+
+def _errors(path: Path, metrics: Any) -> dict[str, float]:
+    """Mean error over range of each estimator, as an evaluation found it."""
+    key = "results"
+    try:
+        schema.check(metrics, dict[str, Any], key)
+        schema.check(metrics.get(key), list[dict[str, Any]], key)
+        errors = {}
+        for n, entry in enumerate(metrics[key]):
+            for word in ("method", "estimator"):
+                schema.check(entry.get(word), str, f"{key}[{n}].{word}")
+            error = entry.get("all")
+            for word in ("errors.mean.over_range", "mean"):
+                schema.check(error, dict[str, Any], f"{key}[{n}].all")
+                error = error.get(word)
+            schema.check(error, float, f"{key}[{n}].all.errors.mean.over_range.mean", {"low": 0.0})
+            errors[f"{entry['method']}/{entry['estimator']}"] = float(error)
+        if not errors:
+            schema.refuse(key, metrics[key], "a list of one estimator or more")
+    except InputError as error:
+        raise InputError(f"{shown(path)}: {error}") from None
+    return errors

@@ -15,6 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="Hydra overrides of the nominal actuator, as actuator.gear_ratio=400",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the motions (results/plans/<name of the bench>)")
+    parser.add_argument("--force", action="store_true", help="replace files that are no motions")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -27,4 +28,5 @@ def run(args: argparse.Namespace) -> None:
     from .. import config
     from ..equations.plan import plan
 
-    plan(args.path, config.diagnosis_spec(config.compose(overrides=args.overrides)), args.out)
+    config.refuse_unread(args.overrides, config.DIAGNOSED, "plan")
+    plan(args.path, config.diagnosis_spec(config.compose(overrides=args.overrides)), args.out, args.force)

@@ -4,6 +4,13 @@ import argparse
 import re
 from pathlib import Path
 
+from . import whole_number
+
+#: groups of the configuration that a simulated recording depends on
+READS = (
+    "actuator", "command", "effects", "faults", "load", "magnet", "recording", "sensors", "temperature", "unit",
+)  # fmt: skip
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -28,10 +35,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="simulate each recording of a bench by its own command, start and temperature, with and without what the "
         "experiment corrects, and print what both differ by",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of noise and start angle (0)")
-    parser.add_argument("--unit-seed", type=int, default=0, help="which unit, if unit=tolerance is given (0)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="of noise and start angle (0)")
+    parser.add_argument("--unit-seed", type=whole_number, default=0, help="which unit, if unit=tolerance is given (0)")
     parser.add_argument("--unit", default="", help="name of the unit, kept in the file")
     parser.add_argument("--health", choices=["healthy", "unknown", "seeded"], help="what the file says of its fault")
+    parser.add_argument("--force", action="store_true", help="replace the file if it exists")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -46,12 +54,17 @@ def run(args: argparse.Namespace) -> None:
     from .. import config
     from ..dataset import simulate_recording
     from ..io.recording import write_recording
+    from ..places import refuse_output
 
     if args.replay:
         _replay(args)
         return
     fault, overrides = read_fault(args.fault)
-    composed = config.compose(args.experiment, [*args.overrides, *overrides])
+    overrides = [*args.overrides, *overrides]
+    config.refuse_unread(overrides, READS, "simulate")
+    composed = config.compose(args.experiment, overrides)
+    motion = [composed["command"]["path"]] if composed["command"]["name"] == "file" else []
+    refuse_output(args.file, read=motion, force=args.force)
     spec = config.dataset_spec(composed, "fresh") | {"seed": args.seed, "unit_seed": args.unit_seed}
     recording = simulate_recording(spec, fault)
     attributes = recording.attributes | {"configuration": json.dumps(spec, sort_keys=True)}
@@ -93,23 +106,32 @@ def read_fault(words: list[str]):
     """
     import numpy as np
 
-    from ..errors import InputError
+    from ..errors import InputError, shown
     from ..faults import FAULT_NAMES
 
-    named = {w.split("=")[0]: w.split("=")[1] for w in words if w.split("=")[0] in FAULT_NAMES and "=" in w}
-    overrides = [w for w in words if "=" in w and w.split("=")[0] not in FAULT_NAMES]
-    numbers = [w for w in words if "=" not in w]
     accepted = "six numbers (Na Nb Nc xi_x xi_y dT) or NAME=VALUE with these names"
+    pairs = [word.split("=", 1) for word in words if "=" in word]
+    numbers = [word for word in words if "=" not in word]
+    named = [(name, text) for name, text in pairs if name in FAULT_NAMES]
+    overrides = ["=".join(pair) for pair in pairs if pair[0] not in FAULT_NAMES]
+    for name, _ in pairs:
+        if "." not in name and name not in (*FAULT_NAMES, *READS):
+            raise InputError(f"--fault: got '{shown(name)}', accepted are {accepted}")
+    for name, _ in named:
+        if [n for n, _ in named].count(name) > 1:
+            raise InputError(f"--fault: {name} is given twice, accepted are {accepted}")
     if numbers and (named or len(numbers) != 6):
-        raise InputError(f"--fault: got {' '.join(words)}, accepted are {accepted}")
+        raise InputError(f"--fault: got {shown(' '.join(words))}, accepted are {accepted}")
     fault = np.zeros(6)
-    for name, text in [*named.items(), *zip(FAULT_NAMES, numbers)]:
+    for name, text in [*named, *zip(FAULT_NAMES, numbers)]:
         try:
-            value = float(text)
+            value = float(text) if "_" not in text else float("nan")
         except ValueError:
-            raise InputError(f"--fault: {name} got '{text}', accepted are {accepted}") from None
+            raise InputError(f"--fault: {name} got '{shown(text)}', accepted are {accepted}") from None
         low, high = (-200.0, 500.0) if name == "dT" else (-0.95, 0.95) if name.startswith("xi") else (0.0, 0.95)
         if not low <= value <= high:
-            raise InputError(f"--fault: {name} got {value:g}, accepted is {low:g} to {high:g}")
+            raise InputError(f"--fault: {name} got {shown(text)}, accepted is {low:g} to {high:g}")
         fault[FAULT_NAMES.index(name)] = value
+    if np.hypot(*fault[3:5]) > 0.95:
+        raise InputError(f"--fault: xi_x, xi_y got {fault[3]:g}, {fault[4]:g}, accepted is a length up to 0.95")
     return fault, overrides

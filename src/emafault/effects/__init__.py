@@ -30,6 +30,12 @@ class EffectParameter:
     tolerance: float = 0.0
     follows: str = ""
 
+    @property
+    def possible(self) -> tuple[float, float]:
+        """Low and high end of what may be simulated: ten times the realistic range, of the sign that the range has."""
+        low, high = min(self.low, self.nominal), max(self.high, self.nominal)
+        return (10.0 * low if low < 0.0 else 0.1 * low), (10.0 * high if high > 0.0 else 0.1 * high)
+
 
 @dataclass(frozen=True)
 class Effect:

@@ -3,10 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..errors import one_line
+from ..plain import escaped
+from ..reporting.written import FROM_DIAGNOSIS
 from .carried import entries, left_out
 from .telling import differing_gains
-
-PACKAGE = "# @package _global_"  # where an experiment's keys go
 
 
 def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[str, float]], name: str) -> str:
@@ -24,9 +25,10 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
     unlisted, gains = entries(verdict), differing_gains(verdict)
     words = [*named, *(["what no catalogue lists"] if unlisted else []), "its unit's tolerances"]
     what = _in_words(words) if len(words) > 1 else f"{words[0]} alone"
+    bench = one_line(verdict["bench"])  # a name's line break would end the comment, its ${} be looked up
     content: dict[str, Any] = {
         "name": name,
-        "question": f"How well is the actuator of bench {verdict['bench']} identified with {what} simulated?",
+        "question": escaped(f"How well is the actuator of bench {bench} identified with {what} simulated?"),
         "effects": rounded,
     }
     if gains:
@@ -36,8 +38,7 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
     body = OmegaConf.to_yaml(OmegaConf.create(content))
     missing = "".join(f"# not simulated: {sentence}\n" for sentence in left_out(verdict))
     head = (
-        f"{PACKAGE}\n"
-        f"# from the diagnosis of {verdict['bench']}: verdict {verdict['verdict']}, digest {verdict['digest']}\n"
+        f"{FROM_DIAGNOSIS}{bench}: verdict {verdict['verdict']}, digest {verdict['digest']}\n"
         "defaults:\n"
         "  - override /reconstruction: [weighted, weighted_floating]\n"
         "  - override /search: none\n"

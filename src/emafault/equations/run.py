@@ -7,11 +7,12 @@ from typing import Any
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
-from ..io.bench import Bench, new_folder, read_bench
+from ..io.bench import Bench, bench_name, new_folder, read_bench
 from ..io.split import split_bench
 from ..paths import results_folder
+from ..places import file_name
 from ..reporting.retrained import section
-from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, file_name
+from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
 from .diagnose import Diagnosed, diagnose
 from .handover import experiment_text
@@ -28,6 +29,7 @@ def diagnose_folder(
     experiment: str | Path | None = None,
     track: bool = True,
     corrected: str | Path | None = None,
+    force: bool = True,
 ) -> dict:
     """Diagnose a folder of recordings; write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
@@ -39,15 +41,18 @@ def diagnose_folder(
     experiment : file that receives the fix as an experiment, besides the one among the results
     corrected : new folder for the recordings with the faults of their measuring chain undone
     track : whether to log an MLflow run; one that fails is said so and breaks nothing
+    force : whether files in ``out`` that are not of a diagnosis of this bench may be replaced
 
     Raises
     ------
     InputError : recordings or effects that cannot be used, or results that cannot be written
     """
-    if corrected is not None:  # refused before the work, not after it
+    name = bench_name(path)
+    folder = Path(out) if out is not None else results_folder() / "diagnoses" / file_name(name)
+    refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
+    if corrected is not None:
         new_folder(path, corrected, "--corrected")
     bench, found = diagnosed(path, spec, exclude)
-    folder = Path(out) if out is not None else results_folder() / "diagnoses" / bench.name
     verdict = found.verdict
     with aside(track) as tracked:
         _write(found, bench, folder, experiment)

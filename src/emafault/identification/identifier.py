@@ -1,6 +1,7 @@
 """A trained identification as one object: estimator, scaling and intervals, saved as one readable file."""
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -8,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from .. import closed_form
+from .. import closed_form, schema
 from ..actuator.parameters import ActuatorParameters
-from ..errors import InputError
+from ..errors import InputError, one_line, shown
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
+from ..plain import array, read_json
 from .intervals import ConformalIntervals
 from .network import Network
 from .settings import NetworkSettings, TrainingSettings
@@ -21,6 +23,10 @@ from .training import TrainedNetwork, train
 ESTIMATORS = ("network", "closed_form")
 FILE = "identifier.json"
 _FORMAT = 1
+_KEYS = (
+    "format", "estimator", "actuator", "alpha_m", "lag", "intervals", "network", "feature_low", "feature_high",
+    "healthy",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,27 +165,52 @@ class Identifier:
         InputError : no such file, or not one of these
         """
         path = Path(folder) / FILE
-        if not path.is_file():
+        if not os.path.lexists(path):
             raise InputError(f"{path}: no such file; train the experiment first")
+        plain = read_json(path)
         try:
-            plain = json.loads(path.read_text())
-            if plain["format"] != _FORMAT:
-                raise InputError(f"{path}: format {plain['format']}, accepted is {_FORMAT}")
-            low, high = plain["feature_low"], plain["feature_high"]
-            return cls(
-                ActuatorParameters(**plain["actuator"]),
-                plain["alpha_m"],
-                plain["lag"],
-                ConformalIntervals.from_plain(plain["intervals"]),
-                Network.from_plain(plain["network"]) if plain["network"] else None,
-                None if low is None else np.array(low),
-                None if high is None else np.array(high),
-                None if plain.get("healthy") is None else np.array(plain["healthy"]),
-            )
-        except (ValueError, KeyError, TypeError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: not a saved identifier ({error})") from error
+            return _from_plain(plain)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            missing = "lacks " if isinstance(error, KeyError) else ""
+            raise InputError(f"{shown(path)}: not a saved identifier ({missing}{one_line(error)})") from error
+
+
+def _from_plain(plain: Any) -> Identifier:
+    """An identifier from what was read, every key checked."""
+    schema.check(plain, dict[str, Any], "identifier")
+    if plain.get("format") != _FORMAT:
+        raise InputError(f"format {plain.get('format')!r}, accepted is {_FORMAT}")
+    for key in plain.keys() - set(_KEYS):
+        raise InputError(schema.unknown_key(key, "identifier", _KEYS))
+    schema.check(plain["estimator"], str, "estimator", {"accepted": ESTIMATORS})
+    if (plain["network"] is None) != (plain["estimator"] == "closed_form"):
+        schema.refuse("network", plain["network"], f"what the estimator {plain['estimator']} has")
+    schema.check(plain["actuator"], schema.Actuator, "actuator")
+    schema.check(plain["alpha_m"], float, "alpha_m", {"low": -0.01, "high": 0.01, "unit": "1/K"})
+    schema.check(plain["lag"], float, "lag", {"low": -500.0, "high": 500.0, "unit": "K"})
+    network = None if plain["network"] is None else Network.from_plain(plain["network"])
+    inputs = 6 if network is None else len(network.scaler.feature_mean)
+    low, high = (None if plain[key] is None else array(plain[key], key) for key in ("feature_low", "feature_high"))
+    for key, values in {"feature_low": low, "feature_high": high}.items():
+        if values is not None and values.shape not in ((6,), (8,)):
+            raise InputError(f"{key}: got {shown(plain[key])}, accepted is one number for each feature")
+        if network is not None and (values is None or len(values) != inputs):
+            raise InputError(f"{key}: got {shown(plain[key])}, accepted are {inputs} numbers, as the network reads")
+    if (low is None) != (high is None) or (low is not None and high is not None and np.any(low > high)):
+        raise InputError("feature_high: is below feature_low, or one of the two is missing")
+    healthy = None if plain.get("healthy") is None else array(plain["healthy"], "healthy", (6,))
+    if healthy is not None and not np.all(healthy > 0.0):
+        raise InputError(f"healthy: got {healthy.tolist()}, accepted are R and k above 0")
+    return Identifier(
+        ActuatorParameters(**plain["actuator"]),
+        plain["alpha_m"],
+        plain["lag"],
+        ConformalIntervals.from_plain(plain["intervals"]),
+        network,
+        low,
+        high,
+        healthy,
+    )
 
 
 def nominal_features(actuator: ActuatorParameters) -> np.ndarray:

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
+from ..plain import array
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,23 @@ class ConformalIntervals:
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "ConformalIntervals":
-        """The inverse of :meth:`to_plain`."""
-        arrays = {key: np.array(value) for key, value in plain.items() if key != "method"}
-        return cls(plain["method"], **arrays)
+        """The inverse of :meth:`to_plain`.
+
+        Raises
+        ------
+        InputError : scores that are not sorted, variances below 0, or other shapes
+        """
+        if not isinstance(plain, dict) or not isinstance(plain["method"], str):
+            raise InputError(f"intervals: got {shown(plain)}, accepted are a method and its scores")
+        scores = array(plain["scores"], "intervals.scores", (None, 6))
+        if not len(scores) or np.any(scores < 0.0) or np.any(np.diff(scores, axis=0) < 0.0):
+            raise InputError("intervals.scores: accepted are rows of scores from 0 up, sorted")
+        variances = {}
+        for key in ("missed_variance", "typical_variance"):
+            variances[key] = array(plain[key], f"intervals.{key}", (6,))
+            if np.any(variances[key] < 0.0):
+                raise InputError(f"intervals.{key}: got {variances[key].tolist()}, accepted are numbers from 0")
+        return cls(plain["method"], scores, **variances)
 
 
 def coverage(low: np.ndarray, high: np.ndarray, truth: np.ndarray) -> dict[str, float]:

@@ -1,11 +1,13 @@
 """The trained network with its scaling: from features in SI units to faults in SI units."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..plain import array
 from .levenberg_marquardt import Weights, outputs
 from .settings import NetworkSettings
 
@@ -90,7 +92,21 @@ class Network:
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "Network":
-        """The inverse of :meth:`to_plain`."""
+        """The inverse of :meth:`to_plain`.
+
+        Raises
+        ------
+        InputError : weights or scales that are not finite, or whose shapes are not those of the settings
+        """
         settings = NetworkSettings.of(plain["settings"])
-        scaler = Scaler(settings.coordinates, **{key: np.array(value) for key, value in plain["scaler"].items()})
-        return cls(settings, scaler, [np.array(W) for W in plain["weights"]])
+        features = len(plain["scaler"]["feature_mean"])
+        sizes = {"feature_mean": features, "feature_scale": features, "fault_mean": 6, "fault_scale": 6}
+        scales = {key: array(plain["scaler"][key], f"network.scaler.{key}", (n,)) for key, n in sizes.items()}
+        for key in ("feature_scale", "fault_scale"):
+            if not np.all(scales[key] > 0.0):
+                raise InputError(f"network.scaler.{key}: got {scales[key].tolist()}, accepted are numbers above 0")
+        shapes = [(o, i + 1) for i, o in pairwise(settings.sizes(features))]
+        if not isinstance(plain["weights"], list) or len(plain["weights"]) != len(shapes):
+            raise InputError(f"network.weights: accepted are {len(shapes)} layers, as network.settings has")
+        weights = [array(W, "network.weights", shape) for W, shape in zip(plain["weights"], shapes)]
+        return cls(settings, Scaler(settings.coordinates, **scales), weights)

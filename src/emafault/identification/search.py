@@ -141,6 +141,10 @@ def open_study(storage: str | Path, name: str, sampler: Any = None):
             lock = JournalFileOpenLock(str(path), grace_period=10)
             _mend(path, lock)
             target = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))
+        except (ValueError, LookupError, TypeError, AssertionError) as error:  # whatever reading other lines leads to
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{path}: {_garbage(path)}; cut it off there, or name another file") from error
         except OSError as error:
             raise InputError(f"{path}: the search cannot be stored ({error.strerror or error})") from error
     try:
@@ -157,6 +161,16 @@ def open_study(storage: str | Path, name: str, sampler: Any = None):
         if type(error).__module__.split(".")[0] not in ("sqlalchemy", "optuna"):
             raise
         raise InputError(f"{storage}: not a usable search storage ({str(error).splitlines()[0]})") from error
+
+
+def _garbage(path: Path) -> str:
+    """Where a journal stops being one."""
+    for number, line in enumerate(path.read_bytes().splitlines(), start=1):
+        try:
+            json.loads(line)["op_code"]
+        except (ValueError, LookupError, TypeError):
+            return f"line {number} is of no search journal"
+    return "its lines are of no search journal"
 
 
 def _mend(path: Path, lock) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..errors import InputError
-from ..io.recording import Recording, read_recording, recordings_in
+from ..errors import InputError, shown
+from ..places import kind, refuse_folder
+from .recording import Recording, read_recording, recordings_in
 from .sensors import refuse_mistaken, useless
 
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
@@ -35,11 +36,19 @@ def read_bench(path: str | Path, actuator: ActuatorParameters) -> Bench:
     ------
     InputError : naming the file, the variable and the rule broken
     """
-    path = Path(path)
     files = recordings_in([path])
     recordings = {file.name: read_recording(file) for file in files}
-    name = path.resolve().name if path.is_dir() else path.stem
-    return check_bench(name, recordings, actuator, {f.name: str(f) for f in files})
+    return check_bench(bench_name(path), recordings, actuator, {f.name: shown(f) for f in files})
+
+
+def bench_name(path: str | Path) -> str:
+    """Name of the bench in a folder or file.
+
+    Raises
+    ------
+    InputError : a path that no file can have
+    """
+    return Path(path).resolve().name if kind(path) == "folder" else Path(path).stem
 
 
 def check_bench(
@@ -97,15 +106,17 @@ def new_folder(bench: str | Path, folder: str | Path, option: str) -> Path:
 
     Raises
     ------
-    InputError : it is the bench's own, or holds files already
+    InputError : it is the bench's own, holds files already, or cannot be written
     """
     folder = Path(folder)
+    kind(folder, option)
     if (
         folder.resolve() == Path(bench).resolve()
         or (folder.exists() and not folder.is_dir())
         or (folder.is_dir() and any(folder.iterdir()))
     ):
         raise InputError(f"{option}: '{folder}' holds files already, accepted is a new folder")
+    refuse_folder(folder, option)
     return folder
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
+from ..places import file_at, kind
 from .atomic import replace_atomically
 
 PHASES = ("a", "b", "c")
@@ -31,6 +32,10 @@ MINIMUM_DURATION = 0.2  # s
 #: variable -> attributes that a recording may have which was not born in the format, besides ``noise`` of any variable
 KNOWN = {"phase_voltage": ("reference",), "phase_current": ("derived",), "rotor_angle": ("source",)}
 REFERENCES = ("star", "modelled_star")  # of phase voltages that are read here
+MINIMUM_SAMPLES = 100  # 2 ms apart, in the least duration
+#: what no actuator has, by unit: larger values are of another unit or of none
+LARGEST = {"s": 1e9, "V": 1e6, "A": 1e6, "rad/s": 1e6, "rad": 1e8, "degC": 1e6}
+LARGEST_FAULT = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1000.0])
 
 
 @dataclass(frozen=True)
@@ -119,55 +124,61 @@ def read_recording(path: str | Path) -> Recording:
     """
     import netCDF4
 
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
+    path = file_at(path)
     try:
         file = netCDF4.Dataset(path)
-    except OSError as error:
-        raise InputError(f"{path}: not a readable netCDF-4 file ({error.strerror or error})") from error
+    except (OSError, RuntimeError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{shown(path)}: not a readable netCDF-4 file ({reason})") from error
     with file:
         file.set_auto_mask(True)
         try:
             return _read_open(path, file)
-        except (RuntimeError, OSError) as error:
-            raise InputError(f"{path}: the file is truncated or damaged ({error})") from error
+        except InputError as error:
+            raise InputError(f"{shown(path)}: {error}") from None
+        except (RuntimeError, OSError, ValueError, AttributeError) as error:
+            raise InputError(f"{shown(path)}: the file is truncated or damaged ({error})") from error
 
 
 def _read_open(path: Path, file) -> Recording:
     def values(name: str, dims: tuple[str, ...], unit: str | None) -> np.ndarray:
         variable = file.variables[name]
         if variable.dimensions != dims:
-            raise InputError(f"{path}: {name} has dimensions {variable.dimensions}, the format asks for {dims}")
+            raise InputError(f"{name} has dimensions {variable.dimensions}, the format asks for {dims}")
         got = getattr(variable, "units", None)
         if unit is not None and got != unit:
-            raise InputError(f"{path}: {name} has unit '{got}', the format asks for '{unit}'")
+            raise InputError(f"{name} has unit '{got}', the format asks for '{unit}'")
         if not np.issubdtype(variable.dtype, np.number):
-            raise InputError(f"{path}: {name} is not numeric")
+            raise InputError(f"{name} is not numeric")
         data: np.ndarray = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
         if not np.all(np.isfinite(data)):
-            raise InputError(f"{path}: {name} holds NaN, infinite or missing values; none are accepted")
+            raise InputError(f"{name} holds NaN, infinite or missing values; none are accepted")
+        largest = LARGEST.get(unit or "", np.inf)
+        if np.any(np.abs(data) > largest):
+            raise InputError(f"{name} reaches {np.max(np.abs(data)):.3g} {unit}, accepted is up to {largest:g} {unit}")
         return data
 
     required = ["time", *(n for n, spec in VARIABLES.items() if spec[2]), "ambient_temperature"]
     for name in required:
         if name not in file.variables:
-            raise InputError(f"{path}: the required variable {name} is missing")
+            raise InputError(f"the required variable {name} is missing")
     if "run" in file.dimensions:
-        raise InputError(f"{path}: has a run dimension; a dataset is not a recording, one run per file is accepted")
+        raise InputError("has a run dimension; a dataset is not a recording, one run per file is accepted")
     if "phase" not in file.dimensions or len(file.dimensions["phase"]) != 3:
-        raise InputError(f"{path}: the dimension phase must have the three entries a, b, c")
+        raise InputError("the dimension phase must have the three entries a, b, c")
     time = values("time", ("time",), "s")
     if len(time) < 2:
-        raise InputError(f"{path}: time has {len(time)} samples; at least {MINIMUM_DURATION} s of data are needed")
+        raise InputError(f"time has {len(time)} samples; at least {MINIMUM_SAMPLES} are needed")
     steps = np.diff(time)
     if np.any(steps <= 0):
-        raise InputError(f"{path}: time does not increase everywhere")
+        raise InputError("time does not increase everywhere")
     step = (time[-1] - time[0]) / (len(time) - 1)
     if np.max(np.abs(steps - step)) > 1e-3 * step:
-        raise InputError(f"{path}: time is not uniform; the format asks for one constant interval")
+        raise InputError("time is not uniform; the format asks for one constant interval")
     if step * len(time) < MINIMUM_DURATION * (1 - 1e-9):
-        raise InputError(f"{path}: holds {step * len(time):.3g} s of data; at least {MINIMUM_DURATION} s are needed")
+        raise InputError(f"holds {step * len(time):.3g} s of data; at least {MINIMUM_DURATION} s are needed")
+    if len(time) < MINIMUM_SAMPLES:
+        raise InputError(f"time has {len(time)} samples; at least {MINIMUM_SAMPLES} are needed")
     data: dict[str, np.ndarray | None] = {}
     known: dict[str, dict[str, Any]] = {}
     for name, (phased, unit, _, _) in VARIABLES.items():
@@ -180,22 +191,24 @@ def _read_open(path: Path, file) -> Recording:
         known[name] = {k: file.variables[name].getncattr(k) for k in ("noise", *KNOWN.get(name, ())) if k in said}
         noise = known[name].get("noise", 1.0)
         if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
-            raise InputError(f"{path}: {name} has noise '{noise}', accepted is a positive number in its unit")
+            raise InputError(f"{name} has noise '{noise}', accepted is a positive number in its unit")
     reference = known["phase_voltage"].get("reference", "star")
     if reference not in REFERENCES:
-        raise InputError(f"{path}: phase_voltage has reference '{reference}', read are {' and '.join(REFERENCES)}")
+        raise InputError(f"phase_voltage has the reference '{reference}', read are {' and '.join(REFERENCES)}")
     speed = data["rotor_speed"]
     assert speed is not None
     if not np.any(speed != 0.0):
-        raise InputError(f"{path}: rotor_speed never leaves zero; a recording in motion is needed")
+        raise InputError("rotor_speed never leaves zero; a recording in motion is needed")
     ambient = float(values("ambient_temperature", (), "degC"))
     fault = values("fault", ("component",), None) if "fault" in file.variables else None
     if fault is not None and fault.shape != (6,):
-        raise InputError(f"{path}: fault has {fault.size} components, the format asks for 6")
+        raise InputError(f"fault has {fault.size} components, the format asks for 6")
+    if fault is not None and np.any(np.abs(fault) > LARGEST_FAULT):
+        raise InputError(f"fault is {fault.tolist()}, accepted is up to {LARGEST_FAULT.tolist()}")
     attributes = {key: str(file.getncattr(key)) for key in file.ncattrs()}
     health = attributes.get("health", "unknown")
     if health not in ("healthy", "unknown", "seeded"):
-        raise InputError(f"{path}: health is '{health}', accepted are healthy, unknown and seeded")
+        raise InputError(f"health is '{health}', accepted are healthy, unknown and seeded")
     return Recording(
         time=time,
         ambient_temperature=ambient,
@@ -217,13 +230,13 @@ def recordings_in(paths: Mapping[str, Path] | list[str | Path]) -> list[Path]:
     found: list[Path] = []
     for entry in paths:
         path = Path(entry)
-        if path.is_dir():
+        if kind(entry) == "folder":
             inside = sorted(p for p in path.glob("*.nc") if not p.name.startswith("."))
             if not inside:
-                raise InputError(f"{path}: the folder holds no recording (*.nc)")
+                raise InputError(f"{shown(path)}: the folder holds no recording (*.nc)")
             found += inside
-        elif path.is_file():
-            found.append(path)
+        elif kind(entry):
+            found.append(file_at(entry))
         else:
-            raise InputError(f"{path}: no such file or folder")
+            raise InputError(f"{shown(path)}: no such file or folder")
     return found

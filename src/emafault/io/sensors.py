@@ -41,6 +41,10 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     if not TEMPERATURES[0] <= ambient <= TEMPERATURES[1]:
         low, high = TEMPERATURES
         raise InputError(f"{path}: ambient_temperature is {ambient:g} degC, accepted is {low:g} to {high:g} degC")
+    for variable in ("phase_voltage", "phase_current"):
+        dead = np.flatnonzero(np.ptp(getattr(recording, variable), axis=0) == 0.0)
+        if len(dead):
+            raise InputError(f"{path}: {variable} of phase {PHASES[dead[0]]} never changes; the channel is dead")
     theta = recording.rotor_angle - recording.rotor_angle[0]
     travel = float(np.ptp(theta))
     if travel > 1.0:

@@ -8,7 +8,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
+from ..places import kind
 from . import back_emf, dq_machine, friction_axis, induction_currents, propeller_sweep, six_step_bus, slow_rotation
 from .statement import COORDINATES, EQUATIONS, Arrays, Distortion, Machine, told
 
@@ -48,17 +49,17 @@ def stated(name: str) -> Stated:
         return _of(name, _MODULES[name])
     if not name.endswith(".py"):
         raise InputError(
-            f"--twin: got '{name}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"
+            f"--twin: got '{shown(name)}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"
         )
+    if kind(name) != "file":
+        raise InputError(f"{shown(name)}: no such file; {ACCEPTED}")
     path = Path(name)
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; {ACCEPTED}")
     spec = util.spec_from_file_location(f"emafault_machine_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as problem:  # whatever a user's file does wrong
+    except (Exception, SystemExit) as problem:  # whatever a user's file does wrong
         raise InputError(f"{path}: {type(problem).__name__}: {' '.join(str(problem).split())}; {ACCEPTED}") from None
     for needed in NEEDED:
         if not callable(getattr(module, needed, None)):
@@ -79,25 +80,32 @@ def read_cases(machine: Stated, path: Path) -> dict[str, Arrays]:
     InputError
         when the file is not what the machine needs, or no file of the folder is.
     """
-    path = Path(path)
-    if path.is_file():
-        return dict(_guarded(machine, "read", path))
-    if not path.is_dir():
-        raise InputError(f"{path}: no such file or folder")
+    path, found = Path(path), kind(path)
+    if found == "file":
+        return _read(machine, path)
+    if found != "folder":
+        raise InputError(f"{shown(path)}: no such file or folder")
     cases: dict[str, Arrays] = {}
     refused = ""
     for file in sorted(path.iterdir()):
         if not file.is_file() or (machine.name in MEASURED and not file.name.endswith((".npz", ".csv", ".csv.gz"))):
             continue
         try:
-            found = _guarded(machine, "read", file)
+            inside = _read(machine, file)
         except InputError as problem:
             refused = refused or str(problem)
             continue
-        cases |= {case if case not in cases else f"{file.name}: {case}": arrays for case, arrays in found.items()}
+        cases |= {case if case not in cases else f"{file.name}: {case}": arrays for case, arrays in inside.items()}
     if not cases:
         raise InputError(f"{path}: no file that twin {machine.name!r} reads" + (f" ({refused})" if refused else ""))
     return cases
+
+
+def _read(machine: Stated, path: Path) -> dict[str, Arrays]:
+    cases = _guarded(machine, "read", path)
+    if not isinstance(cases, Mapping) or not all(isinstance(case, str) for case in cases):
+        raise InputError(f"{machine.name}: read gives {shown(repr(cases))}, accepted is case -> arrays")
+    return dict(cases)
 
 
 def build(machine: Stated, case: str, arrays: Arrays) -> Machine:

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
@@ -12,10 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError, shown
 from ..paths import results_folder
+from ..places import refuse_folder, refuse_irregular, refuse_output
+from ..plain import read_json
 from ..progress import say
 
 VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
+#: what an experiment that a diagnosis wrote begins with
+FROM_DIAGNOSIS = "# @package _global_\n# from the diagnosis of "
 #: the format of every verdict, the reference actuator's and a measured machine's
 SCHEMA_FILE = Path(__file__).with_name("verdict.schema.json")
 
@@ -26,11 +32,19 @@ def to_json(value: Any) -> str:
 
 
 def checked(verdict: Mapping[str, Any]) -> str:
-    """A verdict as written, checked against the schema of its format."""
+    """A verdict as written, checked against the schema of its format.
+
+    Raises
+    ------
+    InputError : naming where it does not fit
+    """
     import jsonschema
 
     text = to_json(verdict)
-    jsonschema.validate(json.loads(text), json.loads(SCHEMA_FILE.read_text()))
+    try:
+        jsonschema.validate(json.loads(text), json.loads(SCHEMA_FILE.read_text()))
+    except jsonschema.ValidationError as error:
+        raise InputError(f"verdict: {error.json_path.removeprefix('$.')}: {shown(error.message)}") from error
     return text
 
 
@@ -48,10 +62,51 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def file_name(text: str) -> str:
-    """Text as the name of a file and of an experiment."""
-    kept = "".join(c if (c.isalnum() and c.isascii()) or c in "_-" else "_" for c in text)
-    return kept.lstrip("_-") or "bench"
+def refuse_foreign(folder: Path, benches: Collection[str], twins: Collection[str], force: bool) -> None:
+    """Refuse a folder of results that cannot be written, or whose files no diagnosis of this bench has written.
+
+    Parameters
+    ----------
+    benches : names of the bench and of its cases
+    twins : names of the machine, which a verdict has
+    force : whether files that are not of this bench may be replaced
+
+    Raises
+    ------
+    InputError : naming the folder or the file
+    """
+    refuse_folder(folder, "--out")
+    there = [folder / name for name in (VERDICT, REPORT, EXPERIMENT) if os.path.lexists(folder / name)]
+    for path in there:
+        refuse_irregular(path, "--out")
+    ours = [folder / EXPERIMENT] if _is_experiment(folder / EXPERIMENT) else []
+    if not force and there != ours and not _is_verdict(folder / VERDICT, benches, twins):
+        raise InputError(f"--out: {shown(there[0])}: is not of a diagnosis of this bench, --force replaces it")
+
+
+def refuse_experiment(path: Path) -> None:
+    """Refuse the file of an experiment that no diagnosis has written.
+
+    Raises
+    ------
+    InputError : naming the experiment
+    """
+    refuse_output(path, "--experiment", force=_is_experiment(path) or not path.exists())
+
+
+def _is_verdict(path: Path, benches: Collection[str], twins: Collection[str]) -> bool:
+    try:
+        read = read_json(path)
+    except InputError:
+        return False
+    return isinstance(read, dict) and read.get("bench") in benches and read.get("twin") in twins
+
+
+def _is_experiment(path: Path) -> bool:
+    try:
+        return path.read_text(encoding="utf-8").startswith(FROM_DIAGNOSIS)
+    except (OSError, UnicodeError):
+        return False
 
 
 @contextmanager

@@ -12,9 +12,10 @@ from ..faults import FAULT_NAMES
 from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
 from ..identification.identifier import Identifier
 from ..io.atomic import replace_atomically
+from ..plain import read_json
 from ..reconstruction.calibration import calibrate
 from .features import FeatureTable, read_features
-from .networks import HISTORY, folders, read_json, seed_folder, width_of, write_json
+from .networks import HISTORY, folders, seed_folder, width_of, write_json
 
 FEW = 10  # rows of the paper's external validation
 _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
@@ -46,7 +47,7 @@ def healthy_units(reference: FeatureTable, units: int, spec: Mapping[str, Any]) 
 
 
 def _identifiers(folder: Path) -> list[Identifier]:
-    return [Identifier.load(seed_folder(folder, seed)) for seed in range(read_json(folder / HISTORY)["seeds"])]
+    return [Identifier.load(seed_folder(folder, seed)) for seed in range(read_json(folder / HISTORY, "seeds")["seeds"])]
 
 
 def evaluate_identification(

@@ -14,8 +14,9 @@ from ..machines.library import build, read_cases, stated
 from ..machines.page import body, finding
 from ..machines.reconstructed import Reconstructed, reconstruct_measured
 from ..machines.withheld import Withheld, check_file, names_of
+from ..places import file_name
 from ..reporting.page import Page
-from ..reporting.written import checked, file_name
+from ..reporting.written import checked
 
 KINDS = {
     "put in": "Changes put in by hand, whose cause is known",

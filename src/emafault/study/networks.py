@@ -14,6 +14,7 @@ from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
 from ..identification.search import SearchSettings, choose, run_worker, summarise
 from ..io.atomic import write_text
+from ..plain import read_json
 from ..progress import progress, say
 from .features import FeatureTable, read_features
 
@@ -24,19 +25,6 @@ def write_json(path: str | Path, value: Any) -> None:
     """Write plain values as readable JSON, whole or not at all."""
     text = json.dumps(value, indent=1, sort_keys=True)
     write_text(path, text + "\n")
-
-
-def read_json(path: str | Path) -> Any:
-    """Read JSON.
-
-    Raises
-    ------
-    InputError : no such file, or not JSON
-    """
-    try:
-        return json.loads(Path(path).read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
 
 
 def write_yaml(path: str | Path, value: Any) -> None:
@@ -90,7 +78,7 @@ def train_identifier(
     table = read_features(features).identified()
     settings = dict(spec)
     if chosen:
-        settings |= {key: read_json(chosen)[key] for key in ("network", "training")}
+        settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
     folder, curves = Path(history).parent, []
     seeds = range(1 if estimator == "closed_form" else settings["seeds"])
     for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):

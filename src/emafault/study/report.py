@@ -8,12 +8,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..plain import read_json
 from ..reporting import errors as error_figures
 from ..reporting import paper as paper_figures
 from ..reporting import search as search_figures
 from ..reporting.page import Page
 from ..reporting.style import named
-from .networks import folders, read_json
+from .networks import folders
 
 #: what the paper reports on ten fresh rows
 PAPER_DT, PAPER_SHARE, PAPER_SECONDS = 1.8, 0.02, 50.0
@@ -55,7 +56,7 @@ def draw_report(
     """
     import xarray as xr
 
-    table = read_json(metrics)
+    table = read_json(metrics, "results", "level", "bound")
     results = table["results"]
     with xr.open_dataset(estimates, engine="netcdf4") as data:
         found = {str(name): data[name].values for name in data.variables if "." in str(name)}
@@ -70,7 +71,7 @@ def draw_report(
     page.heading("Training and search")
     curves = {}
     for folder in folders(histories):
-        history = read_json(folder / "history.json")
+        history = read_json(folder / "history.json", "curves")
         if history["curves"]:
             curves[named(folder.parent.name, folder.name)] = history["curves"]
     text = "Learning curves of the first pass, which stops after the failed validation checks asked for."
@@ -263,7 +264,7 @@ def compare_variants(
     ------
     InputError : a file that cannot be read or written
     """
-    tables = [read_json(path) for path in metrics]
+    tables = [read_json(path, "results", "level", "bound") for path in metrics]
     estimators = [(r["method"], r["estimator"]) for r in tables[0]["results"]]
     if any([(r["method"], r["estimator"]) for r in t["results"]] != estimators for t in tables):
         raise InputError(f"{title}: the variants do not have the same estimators, they cannot be compared")

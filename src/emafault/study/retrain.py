@@ -19,11 +19,12 @@ from ..faults import FAULT_NAMES
 from ..identification.identifier import fit_identifier
 from ..io.bench import read_bench
 from ..io.recording import Recording
+from ..plain import read_json
 from ..progress import progress, say
 from ..reconstruction import Features, join_features, reconstruct
 from ..reporting.retrained import show_in_report
 from ..reporting.written import REPORT, VERDICT
-from .networks import read_json, width_of, write_json
+from .networks import width_of, write_json
 
 BLOCK = 25
 

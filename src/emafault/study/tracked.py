@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..plain import read_json
 from ..tracking import Entry, ensure_experiment, log_run
-from .networks import folders, read_json, write_json
+from .networks import folders, write_json
 
 
 def prepare_tracking(spec: Mapping[str, Any], output: str) -> None:
@@ -47,7 +48,7 @@ def track_evaluation(
     ------
     InputError : an address that cannot be used
     """
-    table, server = read_json(metrics), read_json(where)
+    table, server = read_json(metrics, "results", "bound"), read_json(where, "uri", "experiment")
     best = min(table["results"], key=lambda entry: entry["all"]["errors.mean.over_range"]["mean"])
     values = {f"best.{output}": best["all"][f"errors.{output}.mae"]["mean"] for output in ("dT", "N", "xi")}
     for entry in table["results"]:
@@ -61,7 +62,7 @@ def track_evaluation(
         values |= {f"bound.{name_}.{key}": value for key, value in (bound or {}).items()}
     curves = {}
     for folder in folders(histories):
-        for seed in read_json(folder / "history.json")["curves"][:1]:
+        for seed in read_json(folder / "history.json", "curves")["curves"][:1]:
             for kind in ("train", "validation"):
                 curves[f"curve.{folder.parent.name}.{folder.name}.{kind}"] = seed[0][kind]
     children: list[Entry] = []
