@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
         (folder / f"{name}.yaml").write_text(HEAD + unlisted)
         what = ["--experiment", str(folder / f"{name}.yaml"), "--seed", str(seed), "--fault", "Na=0.04", "dT=15"]
         of = [str(folder / "bench" / f"{name}.nc"), f"command={command}", "recording.duration=0.5"]
-        assert main(["simulate", *of, "reconstruction.paper.discard=0.05", *what]) == 0
+        assert main(["simulate", *of, *what]) == 0
     return folder
 
 

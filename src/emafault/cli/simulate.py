@@ -9,6 +9,7 @@ from . import whole_number
 #: groups of the configuration that a simulated recording depends on
 READS = (
     "actuator", "command", "effects", "faults", "load", "magnet", "recording", "sensors", "temperature", "unit",
+    "unlisted",
 )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ MOVING = 2.0  # rad/s
 CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme value
 CLIPPED_LEAST = 20
 CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise never repeat
+CLIPPED_SPEED = 8  # samples of the speed, which lies on a lattice, at an extreme that the angle goes beyond
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
 SPIKE = 10.0  # robust standard deviations of a second difference
 FEWEST_SPIKES = 3  # in a recording
@@ -202,7 +203,7 @@ def clipped(recording: Recording):
     for extreme in (np.max, np.min):
         level, count, _ = _at_extreme(recording.rotor_speed[moving], extreme)
         beyond = np.abs(w[moving][recording.rotor_speed[moving] == level]) - abs(level)
-        if count >= CLIPPED_FINE and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
+        if count >= CLIPPED_SPEED and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
             yield "rotor_speed", f"clips: {level:.4g} rad/s in {count} samples while the rotor turns faster"
 
 
