@@ -30,14 +30,14 @@ class FeatureTable:
 
     @property
     def inputs(self) -> np.ndarray:
-        """(run, 6) R and k, or (run, 8) with xi behind them where the method measures xi by itself."""
-        xi = self.features.extras.get("xi")
-        return self.features.six if xi is None else np.concatenate([self.features.six, xi], axis=1)
+        """What is identified from, see ``Features.inputs``."""
+        return self.features.inputs
 
     @property
     def covariance(self) -> np.ndarray | None:
-        """(run, 6, 6) of R and k, None where the method gives none."""
-        return self.features.covariance if np.all(np.isfinite(self.features.covariance)) else None
+        """(run, 6, 6) of R and k, or (run, 9, 9) with L; None where the method gives none."""
+        covariance = self.features.inputs_covariance
+        return covariance if np.all(np.isfinite(covariance)) else None
 
     def identified(self) -> "FeatureTable":
         """The runs whose records held enough to estimate all features."""
@@ -132,7 +132,7 @@ def _create(file, variables: Mapping[str, tuple[tuple[str, ...], np.ndarray, dic
 
 
 def read_features(path: str | Path) -> FeatureTable:
-    """Read what ``write_features`` wrote; of the extras only ``xi``, which is learnt from.
+    """Read what ``write_features`` wrote; of the extras only what is identified from.
 
     Raises
     ------
@@ -144,7 +144,8 @@ def read_features(path: str | Path) -> FeatureTable:
         raise InputError(f"{path}: no such file")
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
-            extras = {"xi": data["extra_xi"].values} if "extra_xi" in data.variables else {}
+            kept = ("xi", "nine_covariance")
+            extras = {name: data[f"extra_{name}"].values for name in kept if f"extra_{name}" in data.variables}
             R, k, L, offset, covariance = (data[n].values for n in (*_UNITS, "covariance"))
             features = Features(R, k, L, offset, covariance, extras)
             return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
