@@ -92,9 +92,9 @@ def test_errors_are_unbiased_white_and_normal(measured):
 @pytest.mark.parametrize("interval", [1e-4, 1e-3])
 def test_noise_in_regressors_biases_nothing(interval):
     """At 100 us noise in the measured di/dt is largest: plain least squares is low in L by many standard errors."""
-    _, signals = repeated(np.zeros(6), 100, seed=2, interval=interval)
+    _, signals = repeated(np.zeros(6), 60, seed=2, interval=interval)
     features = reconstruct("nine", signals, interval, ACTUATOR, {})
-    pull = (features.nine - truth(np.zeros((1, 6)))).mean(axis=0) / (features.nine.std(axis=0) / 10.0)
+    pull = (features.nine - truth(np.zeros((1, 6)))).mean(axis=0) / (features.nine.std(axis=0) / np.sqrt(60))
     assert np.max(np.abs(pull)) < 4.0
 
 
@@ -152,7 +152,7 @@ def test_without_end_currents_the_inductance_is_left_open():
     batch = recordings(12, seed=3)
     signals = {name: values for name, values in noisy(batch).items() if name != "phase_current_end"}
     features = reconstruct("nine", signals, 2e-4, ACTUATOR, {"noise": LEVELS})
-    assert not np.any(features.extras["ends"]) and np.all(np.isnan(features.extras["fit"]))
+    assert np.all(np.isnan(features.extras["fit"]))
     six = reconstruct("weighted", signals, 2e-4, ACTUATOR, {"noise": LEVELS, "floating": True})
     np.testing.assert_array_equal(features.six, six.six)
     assert np.all(features.nine_error[:, 6:] > 0.02 * ACTUATOR.inductance)

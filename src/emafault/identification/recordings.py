@@ -9,7 +9,6 @@ import numpy as np
 from ..errors import InputError
 from ..io.recording import Recording
 from ..io.sensors import refuse_mistaken
-from ..reconstruction import Features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
 
@@ -69,12 +68,11 @@ def identify_recordings(
         healthy = reconstruct_recordings(reference, model.method, identifier.actuator, model.settings)
         ambient = np.array([recording.ambient_temperature for recording in reference])
         options = {"ambient_error": model.ambient_error, "alpha_m": identifier.alpha_m}
-        found = calibrate(healthy, ambient, identifier.actuator, **options)
+        found = calibrate(healthy, ambient, identifier.actuator, prior=identifier.prior, **options)
         unit, covariance = found.unit, found.covariance if np.all(np.isfinite(found.covariance)) else None
     estimates, notes = [], []
     for recording, own in zip(recordings, features, strict=True):
-        inputs = _inputs(own)
-        noise = own.covariance if np.all(np.isfinite(own.covariance)) else None
+        inputs, noise = own.inputs, own.inputs_covariance if np.all(np.isfinite(own.inputs_covariance)) else None
         estimates += identifier.estimate(inputs, level, noise, unit, covariance)
         _refuse_impossible(recording.name, estimates[-1])
         beyond = float(identifier.outside(inputs, unit)[0])
@@ -91,8 +89,3 @@ def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -
                 f"{name}: {component} would be {found['value']:.4g}{units}, possible is {low:g} to {high:g}{units}; "
                 "the recording's units, signs or phases are mistaken, or it is of another actuator"
             )
-
-
-def _inputs(features: Features) -> np.ndarray:
-    xi = features.extras.get("xi")
-    return features.six if xi is None else np.concatenate([features.six, xi], axis=1)

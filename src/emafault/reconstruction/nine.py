@@ -354,9 +354,9 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
 
     ``extras``: ``nine_covariance`` (run, 9, 9) of [R, k, L] (SI); ``chi2`` (run, phase) residual variance over the one
     expected from the noise levels; ``fit`` (run, phase) mean square of the sectors' standardised mean residuals, chi2
-    over its ``sectors`` (run, phase) degrees of freedom where the equation holds, whatever the noise; ``ends`` (run,)
-    whether end currents are recorded. Without them L_j is not measured: what ``weighted`` makes of floating and
-    plateau samples is returned, L_j near nominal with 30 % uncertainty, and ``fit`` is NaN.
+    over its ``sectors`` (run, phase) degrees of freedom where the equation holds, whatever the noise. Without end
+    currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, L_j near nominal
+    with 30 % uncertainty, and ``fit`` is NaN.
 
     Raises
     ------
@@ -377,8 +377,7 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
             joint = join_phases(each.phases, each.rows, (CURRENT, EMF, DIDT))
             nine[each.run] = joint * max(1.0, float(np.max(found.extras["chi2"][each.run])))
         chi2[:] = found.extras["chi2"]
-        extras = told | {"ends": np.zeros(runs, bool)}
-        return Features(found.R, found.k, found.L, found.offset, found.covariance, extras)
+        return Features(found.R, found.k, found.L, found.offset, found.covariance, told)
     stated = None if s.noise is None else stated_noise(s.noise)
     beta = np.full((4, runs, 3), np.nan)
     for run in range(runs):
@@ -388,4 +387,4 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
             beta[:, run], nine[run], chi2[run] = estimate.beta, estimate.covariance, estimate.chi2
             fit[run], sectors[run] = estimate.fit, estimate.sectors
     R, k, L, offset = beta
-    return Features(R, k, L, offset, nine[:, :6, :6].copy(), told | {"ends": np.ones(runs, bool)})
+    return Features(R, k, L, offset, nine[:, :6, :6].copy(), told)
