@@ -37,7 +37,8 @@ class FeatureTable:
     def covariance(self) -> np.ndarray | None:
         """(run, 6, 6) of R and k, or (run, 9, 9) with L; None where the method gives none."""
         covariance = self.features.inputs_covariance
-        return covariance if np.all(np.isfinite(covariance)) else None
+        known = self.features.identified
+        return covariance if np.any(known) and np.all(np.isfinite(covariance[known])) else None
 
     def identified(self) -> "FeatureTable":
         """The runs whose records held enough to estimate all features."""
@@ -154,9 +155,12 @@ def read_features(path: str | Path) -> FeatureTable:
 
 
 def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
-    """Cramer-Rao standard deviations of the first fresh runs' faults, from plateau samples and with floating ones too.
+    """Cramer-Rao standard deviations of the first fresh runs' faults.
 
-    They are NaN where the bound does not hold: without noise, and under the rotor-angle laws, whose R, k carry no xi.
+    ``plateau`` and ``floating`` are those of six features, from plateau samples and with floating ones too;
+    ``recording`` is that of all intervals of the recording with L among the coefficients, and with what is known of R0,
+    k0, L0 and the magnets' lag beforehand. They are NaN where the bounds do not hold: without noise, and under the
+    rotor-angle laws, whose R, k carry no xi.
 
     Parameters
     ----------
@@ -170,7 +174,8 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
 
     from ..actuator.commands import command_positions
     from ..actuator.simulate import simulate
-    from ..reconstruction.bounds import cramer_rao_bound
+    from ..identification.posterior import Knowledge, nine_forward, posterior
+    from ..reconstruction.bounds import cramer_rao_bound, nine_bound
 
     part = spec["dataset"]
     recording, settings = part["recording"], dict(part["command"])
@@ -180,8 +185,9 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     )
     sample = sample_runs(part)
     runs, faults = sample.records(slice(spec["runs"])), sample.faults[: spec["runs"]]
-    actuator = ActuatorParameters(**part["actuator"])
-    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": []}
+    actuator, known = ActuatorParameters(**part["actuator"]), Knowledge(**spec["known"])
+    alpha_m = spec["magnet_coefficient"]
+    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": [], "recording": []}
     holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
     for start in progress(range(0, len(runs), BLOCK), "bound", -(-len(runs) // BLOCK)):
         if not holds:
@@ -189,12 +195,18 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
                 parts.append(np.full((len(runs[start : start + BLOCK]), 6), np.nan))
             continue
         clean = simulate(runs[start : start + BLOCK], command, recording["duration"], recording["interval"])
-        for name, parts in found.items():
+        interval, noise = recording["interval"], part["sensors"]
+        for name in ("plateau", "floating"):
             choice = {"discard": spec["discard"], "floating": name == "floating"}
-            bound = cramer_rao_bound(
-                clean, recording["interval"], actuator, part["sensors"], choice, spec["magnet_coefficient"]
-            )
-            parts.append(bound.standard_error)
+            bound = cramer_rao_bound(clean, interval, actuator, noise, choice, alpha_m)
+            found[name].append(bound.standard_error)
+        nine = nine_bound(clean, interval, actuator, noise, {"discard": spec["discard"]})
+        rows = slice(start, start + len(nine))
+        true = nine_forward(faults[rows], actuator, alpha_m, sample.dT_magnet[rows])
+        least = posterior(
+            true, nine + known.covariance() * true[:, :, None] * true[:, None, :], actuator, alpha_m, known
+        )
+        found["recording"].append(np.sqrt(np.diagonal(least.covariance, axis1=1, axis2=2)))
     data = xr.Dataset(
         {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
         | {"fault": (("run", "component"), faults)},
