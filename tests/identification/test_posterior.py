@@ -9,7 +9,7 @@ from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification.evaluation import FeatureSet, evaluate
 from emafault.identification.identifier import Identifier, fit_identifier
 from emafault.identification.intervals import coverage
-from emafault.identification.posterior import FREEDOM, Knowledge, nine_forward, nominal_nine, posterior
+from emafault.identification.posterior import FREEDOM, Knowledge, model_error, nine_forward, nominal_nine, posterior
 from emafault.reconstruction.calibration import calibrate
 from emafault.reconstruction.features import Features
 
@@ -130,3 +130,19 @@ def test_a_coefficient_that_is_not_positive_is_refused(actuator):
     nine[0, 7] = -1e-4
     with pytest.raises(InputError, match="L_b of run 0 is"):
         posterior(nine, covariance, actuator, 0.0, Knowledge())
+
+
+def test_coefficients_that_fit_no_fault_get_an_error_of_their_own(actuator):
+    few = slice(0, 300)
+    off = 1.0 + 0.01 * np.random.default_rng(9).standard_normal((300, 9))  # every coefficient by 1 %
+    nine, covariance = measured(actuator, FAULTS[few], unit=off)
+    found = model_error(nine, covariance, actuator, 0.0, Knowledge())
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(0.01, rel=0.1)
+    wider = covariance + np.eye(9) * (found[:, None, None] * nine[:, :, None]) ** 2
+    low, high = (s * 1.645 for s in (-1.0, 1.0))
+    z = pulls(posterior(nine, wider, actuator, 0.0, Knowledge()), FAULTS[few])
+    assert np.mean((z > low) & (z < high)) > 0.7
+    blind = pulls(posterior(nine, covariance, actuator, 0.0, Knowledge()), FAULTS[few])
+    assert np.mean((blind > low) & (blind < high)) < 0.4
+    none = model_error(*measured(actuator, FAULTS), actuator, 0.0, Knowledge())
+    assert np.mean(none > 0.0) < 1e-3

@@ -15,7 +15,7 @@ from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
 from .intervals import ConformalIntervals
 from .network import Network, logarithmic
-from .posterior import Knowledge, Posterior, nominal_nine, posterior
+from .posterior import Knowledge, Posterior, model_error, nominal_nine, posterior
 from .settings import NetworkSettings, TrainingSettings
 from .training import TrainedNetwork, train
 
@@ -116,6 +116,22 @@ class Identifier:
             }
             for n in range(len(value))
         ]
+
+    def model_error(
+        self,
+        features: np.ndarray,
+        covariance: np.ndarray | None,
+        unit: np.ndarray | None = None,
+        unit_covariance: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """(run,) relative error of nine features beside their noise without which no fault of the unit explains them.
+
+        Zero where noise explains them, and of six or eight features, which a fault always explains.
+        """
+        if np.shape(features)[1] != 9:
+            return np.zeros(len(features))
+        x, C = replace(self, network=None)._nominal(features, covariance, unit, unit_covariance)
+        return np.zeros(len(x)) if C is None else model_error(x, C, self.actuator, self.alpha_m, self.known)
 
     def outside(self, features: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
         """How far each run (run,) lies outside the features learnt from, as a fraction of their range; 0 is inside."""

@@ -8,12 +8,15 @@ In logarithms the laws are sums, r_j = R_j/R0, q_j = k_j/k0, l_j = L_j/L0 (symbo
 
 Nothing is known beforehand of N, xi and dT. R0, k0 and L0 of the unit are known to a covariance, which is added to the
 noise's; the magnets' lag is a seventh unknown with a Gaussian prior. Nine data and, with the prior of the lag, one more
-leave three degrees of freedom, whose misfit tells whether any fault of the unit explains the coefficients.
+leave three degrees of freedom, whose misfit tells whether any fault of the unit explains the coefficients. Where none
+does, every coefficient is given a relative error of one size beside its noise, such that the misfit is what it should
+be (Paule and Mandel, J. Res. Natl. Bur. Stand. 87, 1982, 377).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..actuator.parameters import ActuatorParameters
 from ..closed_form import ECCENTRICITY_AXES, forward, inductance, inverse
@@ -21,6 +24,9 @@ from ..errors import InputError
 
 STEPS = 6  # of Gauss-Newton; from the closed form two change nothing but the last digits
 FREEDOM = 3  # degrees of freedom of the misfit
+CHANCE = 1e-4  # of a misfit, or of a phase's lack of fit, that is still taken for noise
+LARGEST_ERROR = 1.0  # of a coefficient, that is looked for
+HALVINGS = 40
 LEAST_SHARE = 0.02  # of its turns that a phase keeps, and of its nominal value that resistance or flux keeps
 
 
@@ -122,3 +128,24 @@ def posterior(
     if free == 7:
         misfit += prior[6] * (x[:, 6] - known.lag) ** 2
     return Posterior(x[:, :6], spread[:, :6, :6], misfit)
+
+
+def model_error(
+    nine: np.ndarray, covariance: np.ndarray, actuator: ActuatorParameters, alpha_m: float, known: Knowledge
+) -> np.ndarray:
+    """(run,) relative error of each coefficient that brings the misfit down to its mean, 0 where noise explains it.
+
+    Arguments are those of :func:`posterior`.
+    """
+    found = posterior(nine, covariance, actuator, alpha_m, known)
+    out = np.zeros(len(nine))
+    off = np.flatnonzero(found.misfit > chi2.isf(CHANCE, FREEDOM))
+    y, noise = nine[off], covariance[off]
+    low, high = np.zeros(len(off)), np.full(len(off), LARGEST_ERROR)
+    for _ in range(HALVINGS if len(off) else 0):
+        middle = 0.5 * (low + high)
+        wider = noise + np.eye(9) * ((middle[:, None] * y) ** 2)[:, None, :]
+        too_small = posterior(y, wider, actuator, alpha_m, known).misfit > FREEDOM
+        low, high = np.where(too_small, middle, low), np.where(too_small, high, middle)
+    out[off] = high
+    return out

@@ -31,11 +31,12 @@ from ..closed_form import PHASE_AXIS
 from ..compiled import compiled
 from ..equations.shape import trapezoid_swept
 from .features import Features, Signals, check_number, read_settings
-from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular, join_phases
+from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
 from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise
 from .rows import OFF_HALF_WIDTH, is_zero
-from .weighted import WeightedSettings, fit_runs
+from .weighted import LOOSE_INDUCTANCE, WeightedSettings, fit_runs
 
+STRETCH = np.pi / 12.0  # electrical rad, of rotor angle over which residuals are averaged to judge the fit
 PASSES = 2  # with corrected regressors; a third changes less than a thousandth of a standard error
 FEWEST_FLOATING = 10  # samples of a phase, to tell its offset and the currents' noise
 CLEAR = np.deg2rad(0.2)  # electrical angle kept clear of the edges of the off sector, for the angle's noise
@@ -65,7 +66,7 @@ class Record:
     f: np.ndarray  # (row, phase) mean of f over the angle turned
     live: np.ndarray  # (row, phase) bool: not floating
     live_end: np.ndarray  # (row + 1, phase) bool
-    sector: np.ndarray  # (row,) number of the commutation sector in which the row begins
+    stretch: np.ndarray  # (row,) number of the stretch of rotor angle in which the row begins
     noise: NoiseLevels  # as the record tells it, the voltage's apart
     interval: float  # s
 
@@ -77,8 +78,8 @@ class NineFit:
     beta: np.ndarray  # (4, phase) R, k, L, c
     covariance: np.ndarray  # (9, 9) of [R, k, L]
     chi2: np.ndarray  # (phase,) residual variance over the one expected
-    fit: np.ndarray  # (phase,) mean square of the sectors' standardised mean residuals, 1 where the equation holds
-    sectors: np.ndarray  # (phase,) how many
+    fit: np.ndarray  # mean square of the stretches' standardised mean residuals, (phase,), 1 where the equation holds
+    freedom: np.ndarray  # (phase,) its degrees of freedom
 
 
 @compiled
@@ -256,7 +257,7 @@ def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: Nin
         f=np.where(moving, emf / np.where(moving, rate, 1.0), 0.0),
         live=~floating[part],
         live_end=~still[first - 1 :],
-        sector=np.floor((p * angle[first - 1 : -1] - np.pi / 6.0) / (np.pi / 3.0)).astype(np.int64),
+        stretch=np.floor(p * angle[first - 1 : -1] / STRETCH).astype(np.int64),
         noise=NoiseLevels(USUAL_VOLTAGE, mean, at_end, rate_noise),
         interval=h,
     )
@@ -335,28 +336,28 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
         if is_singular(normal):
             return None
         beta = beta + np.linalg.solve(normal, W.T @ white.ravel()).reshape(4, 3)
-    fit, sectors = _by_sector(r.sector, white)
+    fit, freedom = _by_stretch(r.stretch, white)
     covariance = nine_of(information(replace(r, i=i, end=end), beta, noise))
-    return NineFit(beta, covariance, np.mean(white**2, axis=0), fit, sectors)
+    return NineFit(beta, covariance, np.mean(white**2, axis=0), fit, freedom)
 
 
-def _by_sector(sector: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(phase,) mean square of the standardised means of white residuals over each stay in a sector; how many."""
-    starts = np.flatnonzero(np.diff(sector, prepend=sector[0] - 1))
-    lengths = np.diff(starts, append=len(sector))
-    means = np.add.reduceat(white, starts, axis=0) / np.sqrt(lengths)[:, None]
-    freedom = max(len(starts) - 4, 1)
-    return np.sum(means**2, axis=0) / freedom, np.full(3, freedom)
+def _by_stretch(stretch: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(phase,) mean square of white residuals' standardised means over each stay in a stretch; its freedom."""
+    starts = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
+    lengths = np.diff(starts, append=len(stretch))
+    total = np.sum((np.add.reduceat(white, starts, axis=0) / np.sqrt(lengths)[:, None]) ** 2, axis=0)
+    freedom = max(len(starts) - UNKNOWNS // 3, 1)
+    return total / freedom, np.full(3, freedom)
 
 
 def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
     """R_j, k_j, L_j and intercept of each phase with their joint covariance.
 
     ``extras``: ``nine_covariance`` (run, 9, 9) of [R, k, L] (SI); ``chi2`` (run, phase) residual variance over the one
-    expected from the noise levels; ``fit`` (run, phase) mean square of the sectors' standardised mean residuals, chi2
-    over its ``sectors`` (run, phase) degrees of freedom where the equation holds, whatever the noise. Without end
-    currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, L_j near nominal
-    with 30 % uncertainty, and ``fit`` is NaN.
+    expected from the noise levels; ``fit`` (run, phase) mean square of the standardised mean residuals of 15 electrical
+    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise. Without end
+    currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, with L_j nominal
+    to 30 %, and ``fit`` is NaN.
 
     Raises
     ------
@@ -368,16 +369,18 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
     check_number("nine", "zero_current", s.zero_current, 0.0)
     runs = signals.runs
     nine, chi2, fit = np.full((runs, 9, 9), np.nan), np.full((runs, 3), np.nan), np.full((runs, 3), np.nan)
-    sectors = np.zeros((runs, 3), np.int64)
-    told = {"chi2": chi2, "fit": fit, "sectors": sectors, "nine_covariance": nine}
+    freedom = np.zeros((runs, 3), np.int64)
+    told = {"chi2": chi2, "fit": fit, "freedom": freedom, "nine_covariance": nine}
     if signals.current_end is None:
         plain = WeightedSettings(s.discard, 2.0, s.plateau_width, True, s.zero_current, s.noise)
         found, fits = fit_runs(signals, actuator, plain, lambda rows: rows.f[:, None])
         for each in fits:
-            joint = join_phases(each.phases, each.rows, (CURRENT, EMF, DIDT))
-            nine[each.run] = joint * max(1.0, float(np.max(found.extras["chi2"][each.run])))
+            nine[each.run] = 0.0
+            nine[each.run, :6, :6] = found.covariance[each.run]
+            nine[each.run, 6:, 6:] = np.eye(3) * (LOOSE_INDUCTANCE * actuator.inductance) ** 2
         chi2[:] = found.extras["chi2"]
-        return Features(found.R, found.k, found.L, found.offset, found.covariance, told)
+        nominal = np.where(np.isfinite(found.R), actuator.inductance, np.nan)
+        return Features(found.R, found.k, nominal, found.offset, found.covariance, told)
     stated = None if s.noise is None else stated_noise(s.noise)
     beta = np.full((4, runs, 3), np.nan)
     for run in range(runs):
@@ -385,6 +388,6 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
         estimate = None if record is None else fit_record(record, actuator, stated)
         if estimate is not None:
             beta[:, run], nine[run], chi2[run] = estimate.beta, estimate.covariance, estimate.chi2
-            fit[run], sectors[run] = estimate.fit, estimate.sectors
+            fit[run], freedom[run] = estimate.fit, estimate.freedom
     R, k, L, offset = beta
     return Features(R, k, L, offset, nine[:, :6, :6].copy(), told)
