@@ -150,3 +150,43 @@ def test_identification_before_and_after_the_chain_is_corrected(tmp_path):
     rows = [np.array([float(x) for x in line.split()[-6:]]) for line in (recorded, corrected, true)]
     assert rows[2] == pytest.approx([0.05, 0.0, 0.0, 0.0, 0.0, 20.0])
     assert np.abs(rows[1][:5] - rows[2][:5]).max() < 0.01 < np.abs(rows[0][:5] - rows[2][:5]).max()
+
+
+def _identified(path, tmp_path, capsys, *more):
+    out = tmp_path / "nine.json"
+    (tmp_path / "nowhere").mkdir(exist_ok=True)
+    nowhere = ["--results", str(tmp_path / "nowhere"), "--force"]
+    assert main(["identify", str(path), "--experiment", "nine_features", "--json", str(out), *nowhere, *more]) == 0
+    (found,) = json.loads(out.read_text()).values()
+    said = capsys.readouterr()
+    assert "nine/closed_form" in said.out
+    return found, said.err
+
+
+def test_nine_features_narrow_the_intervals_and_need_end_currents(folder, tmp_path, capsys):
+    found, said = _identified(folder / "faulty.nc", tmp_path, capsys)
+    assert said == ""
+    blind = tmp_path / "blind.nc"
+    write_recording(blind, replace(read_recording(folder / "faulty.nc"), phase_current_end=None))
+    wide, said = _identified(blind, tmp_path, capsys)
+    assert "no end currents" in said
+    for name, truth in zip(FAULT_NAMES, FAULT):
+        half = 0.5 * (found[name]["high"] - found[name]["low"])
+        assert abs(found[name]["value"] - truth) < 3.0 * half
+        assert name == "dT" or half < 0.5 * 0.5 * (wide[name]["high"] - wide[name]["low"])
+
+
+def test_a_recording_that_fits_neither_its_equations_nor_any_fault_is_told(tmp_path, capsys):
+    bent = tmp_path / "bent.nc"
+    main(["simulate", str(bent), "effects.back_emf_shape.h5=0.02", "--fault", "Na=0.05", "dT=10"])
+    found, said = _identified(bent, tmp_path, capsys)
+    assert "phase a, b, c does not fit its equation" in said
+    truth = dict(zip(FAULT_NAMES, (0.05, 0.0, 0.0, 0.0, 0.0, 10.0)))
+    assert all(found[n]["low"] < v < found[n]["high"] for n, v in truth.items())
+    other = tmp_path / "other.nc"
+    main(["simulate", str(other), "effects.inductance_tolerance.L_scale=1.2", "--fault", "Na=0.05"])
+    _, said = _identified(other, tmp_path, capsys)
+    assert "R, k and L fit no fault of this unit" in said and "equation" not in said
+    main(["simulate", str(other), "effects.inductance_tolerance.L_scale=1.4", "--fault", "Na=0.05", "--force"])
+    assert main(["identify", str(other), "--experiment", "nine_features", "--results", str(tmp_path)]) == 2
+    assert "fit no fault of this actuator" in capsys.readouterr().err

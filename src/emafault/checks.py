@@ -60,6 +60,9 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     in_machine = sum(entry["place"] in MACHINE for entry in config["unlisted"])
     if in_machine > MOST_TERMS:
         schema.refuse("unlisted", f"{in_machine} entries in the machine", f"{MOST_TERMS} at most")
+    for effect in config["unit"]["spread_of"] or []:
+        if effect not in _calibrations():
+            schema.refuse("unit.spread_of", effect, ", ".join(_calibrations()))
     recording = config["recording"]
     intervals = recording["duration"] / recording["interval"]
     if abs(intervals - round(intervals)) > 1e-6:
@@ -158,6 +161,13 @@ def _check_named(key: str, value: Mapping[str, Any], label: str, schemas: Mappin
     if not isinstance(chosen, str) or chosen not in schemas:
         schema.refuse(f"{key}.{label}", chosen, ", ".join(schemas))
     schema.check(value, schemas[chosen], key)
+
+
+def _calibrations() -> list[str]:
+    """Effects with a tolerance."""
+    from .effects import EFFECTS
+
+    return [id_ for id_, effect in EFFECTS.items() if any(p.tolerance for p in effect.parameters.values())]
 
 
 def _check_effects(effects: Mapping[str, Mapping[str, float]]) -> None:

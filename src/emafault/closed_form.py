@@ -44,6 +44,11 @@ def forward(
     return R, k
 
 
+def inductance(faults: np.ndarray, actuator: ActuatorParameters) -> np.ndarray:
+    """Inductances of given faults, L0 (1 - N_j)^2: (run, 6) -> (run, 3) in H."""
+    return actuator.inductance * (1.0 - np.asarray(faults)[..., :3]) ** 2
+
+
 def inverse(
     R: np.ndarray, k: np.ndarray, actuator: ActuatorParameters, alpha_m: float = 0.0, lag: float = 0.0
 ) -> np.ndarray:

@@ -306,6 +306,7 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "seed": seed + PARTS[part],
         "unit_seed": seed + (PARTS[part] if part == "training" else PARTS["fresh"]),
         "tolerance": unit["training_tolerance" if part == "training" else "tolerance"],
+        "spread_of": unit["spread_of"],
         "healthy": part == "reference",
         "runs": sampling["runs"] if part == "training" else sampling["fresh"],
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
@@ -323,13 +324,14 @@ def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any
 
 
 def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
-    """What the Cramer-Rao bound of the fresh rows reads: all samples that any least-squares method uses."""
+    """What the Cramer-Rao bounds of the fresh rows read: all samples that any least-squares method uses."""
     methods = [entry for entry in config["reconstruction"].values() if entry["method"] != "paper"]
     spec = {
         "dataset": dataset_spec(config, "fresh"),
         "runs": min(config["evaluation"]["bound_runs"], config["sampling"]["fresh"]),
         "discard": min((entry["discard"] for entry in methods), default=config["recording"]["discard"]),
         "magnet_coefficient": magnet_coefficient(config),
+        "known": known(config),
     }
     return recursively_sorted(spec)
 
@@ -349,10 +351,16 @@ def identification_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     spec = {
         "actuator": config["actuator"],
         "magnet_coefficient": magnet_coefficient(config),
-        "magnet_lag": 0.5 * (config["magnet"]["lag"]["low"] + config["magnet"]["lag"]["high"]),
+        "known": known(config),
         "faults": _pick(config["faults"], "N", "xi", "dT"),
     }
     return recursively_sorted(spec)
+
+
+def known(config: Mapping[str, Any]) -> dict[str, float]:
+    """Relative standard deviations to which R0, k0 and L0 are known, and the magnets' expected lag with its own (K)."""
+    low, high = config["magnet"]["lag"]["low"], config["magnet"]["lag"]["high"]
+    return {**config["unit"]["known"], "lag": 0.5 * (low + high), "lag_deviation": (high - low) / 12.0**0.5}
 
 
 def network_spec(config: Mapping[str, Any], estimator: str) -> dict[str, Any]:
@@ -378,9 +386,16 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
         "level": config["evaluation"]["level"],
         "ambient_error": config["sensors"]["ambient"],
         "draws": max(10, config["evaluation"]["seeds"]),
-        "plateau_only": {name: entry["method"] == "weighted" and not entry["floating"] for name, entry in methods},
+        "bounds": {name: _bound_beside(entry) for name, entry in methods},
     }
     return recursively_sorted(identification_spec(config) | spec)
+
+
+def _bound_beside(entry: Mapping[str, Any]) -> str:
+    """Which bound an entry of the group reconstruction stands beside, see ``study.features.compute_bound``."""
+    if entry["method"] == "nine":
+        return "recording"
+    return "plateau" if entry["method"] == "weighted" and not entry["floating"] else "floating"
 
 
 def diagnosis_spec(config: Mapping[str, Any]) -> dict[str, Any]:

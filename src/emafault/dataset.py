@@ -95,7 +95,7 @@ def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> Sa
     spread = {}
     if spec["tolerance"]:
         rng = np.random.default_rng([spec["unit_seed"], 4])
-        for effect in EFFECTS.values():
+        for effect in (EFFECTS[name] for name in spec["spread_of"] or EFFECTS):
             for name, parameter in effect.parameters.items():
                 if parameter.tolerance:
                     deviation = spec["tolerance"] * parameter.tolerance

@@ -131,10 +131,19 @@ class Sensors:
 
 
 @dataclass
+class Known:
+    R: float = number(0.0, 1.0, "of R0")
+    k: float = number(0.0, 1.0, "of k0")
+    L: float = number(0.0, 1.0, "of L0")
+
+
+@dataclass
 class Unit:
     tolerance: float = number(0.0, 4.0, "standard deviations")
     training_tolerance: float = number(0.0, 4.0, "standard deviations")
     reference_recordings: int = number(0, 8)
+    spread_of: list[str] | None = group()
+    known: Known = group()
 
 
 @dataclass
@@ -235,6 +244,16 @@ RECONSTRUCTIONS: dict[str, type] = {
         ],
     ),
     "weighted": make_dataclass("weighted", [("method", str, choice("weighted")), *_WEIGHTED]),
+    "nine": make_dataclass(
+        "nine",
+        [
+            ("method", str, choice("nine")),
+            ("discard", float, number(0.0, 3600.0, "s")),
+            ("plateau_width", float, number(30.0, 180.0, "electrical degrees")),
+            ("zero_current", float, number(0.0, 10.0, "A")),
+            ("noise", dict[str, float] | None, group()),
+        ],
+    ),
     "angle_resolved": make_dataclass(
         "angle_resolved",
         [

@@ -80,7 +80,7 @@ def _train(folder: Path) -> None:
     features = np.concatenate(closed_form.forward(faults, actuator, 0.0, faults[:, 5]), axis=1)
     network = NetworkSettings.of({**composed["network"], "width": 3})
     training = TrainingSettings.of({**composed["training"], "epochs": 5})
-    magnet = {"alpha_m": spec["magnet_coefficient"], "lag": spec["magnet_lag"]}
+    magnet = {"alpha_m": spec["magnet_coefficient"], "lag": spec["known"]["lag"]}
     fit = fit_identifier("network", features, faults, actuator, network=network, training=training, **magnet)
     estimator = folder / "identifiers" / "weighted" / "network"
     fit.identifier.save(seed_folder(estimator, 0))

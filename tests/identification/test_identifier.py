@@ -9,8 +9,9 @@ from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES
 from emafault.identification import evaluation
 from emafault.identification.export import export_onnx
-from emafault.identification.identifier import Identifier, fit_identifier, nominal_features
+from emafault.identification.identifier import Identifier, fit_identifier
 from emafault.identification.intervals import ConformalIntervals, coverage
+from emafault.identification.posterior import nominal_nine
 
 from .conftest import NOISE
 
@@ -117,7 +118,7 @@ def test_features_far_from_those_learnt_are_told(fitted, fresh):
 
 def test_calibration_undoes_a_units_tolerance(fitted, fresh, actuator, width):
     scale = np.repeat([1.01, 0.995], 3)
-    unit = nominal_features(actuator) * scale
+    unit = nominal_nine(actuator)[:6] * scale
     off = evaluation.FeatureSet(
         fresh.features * scale, fresh.faults, fresh.covariance * np.outer(scale, scale), fresh.bound
     )
@@ -131,7 +132,7 @@ def test_calibration_undoes_a_units_tolerance(fitted, fresh, actuator, width):
 
 
 def test_intervals_know_that_a_reference_record_is_noisy_too(fitted, fresh, actuator, width):
-    healthy = nominal_features(actuator)
+    healthy = nominal_nine(actuator)[:6]
     covariance = np.kron(NOISE, np.eye(3)) * np.outer(healthy, healthy)
     rng = np.random.default_rng(8)
     unit = rng.multivariate_normal(healthy, covariance, len(fresh.faults))
@@ -185,7 +186,7 @@ def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fre
     bias = np.array([1.06, 1.06, 1.06, 0.9, 0.9, 0.9])
     biased = training.features * bias
     fit = fit_identifier("network", biased, training.faults, actuator, intervals="split", **SETTINGS)
-    unit = nominal_features(actuator) * np.repeat([1.01, 0.995], 3)
+    unit = nominal_nine(actuator)[:6] * np.repeat([1.01, 0.995], 3)
     off = evaluation.FeatureSet(fresh.features * bias * np.repeat([1.01, 0.995], 3), fresh.faults)
     straight = evaluation.evaluate(fit.identifier, evaluation.FeatureSet(fresh.features * bias, fresh.faults), width)
     calibrated = evaluation.evaluate(fit.identifier, off, width, unit=unit * bias)

@@ -5,15 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from scipy.stats import norm
-
 from .. import checks, schema
 from .. import config as configuration
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, shown
 from ..identification.identifier import Identifier
 from ..identification.intervals import ConformalIntervals
+from ..identification.posterior import Knowledge
 from ..identification.recordings import Model
 from ..paths import results_folder
 from ..places import kind
@@ -69,12 +67,11 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
 
 def untrained_closed_form(config: Mapping[str, Any]) -> Identifier:
     """The closed form with intervals from the noise of the features alone, taken as Gaussian."""
-    quantiles = np.sort(np.abs(norm.ppf((np.arange(20_000) + 0.5) / 20_000)))
-    scores = np.repeat(quantiles[:, None], 6, axis=1)
-    intervals = ConformalIntervals("Gaussian noise of the features", scores, np.full(6, 1e-24), np.full(6, np.nan))
+    intervals = ConformalIntervals.gaussian("Gaussian noise of the features")
     spec = configuration.identification_spec(config)
     actuator = ActuatorParameters(**spec["actuator"])
-    return Identifier(actuator, spec["magnet_coefficient"], spec["magnet_lag"], intervals)
+    known = Knowledge(**spec["known"])
+    return Identifier(actuator, spec["magnet_coefficient"], known.lag, intervals, known=known)
 
 
 def _read_configuration(path: Path) -> dict[str, Any]:
@@ -91,7 +88,8 @@ def _most_accurate(folder: Path, config: Mapping[str, Any], known: set[str]) -> 
     path = folder / "evaluation" / "metrics.json"
     if not os.path.lexists(path):
         methods = list(config["reconstruction"])
-        return f"{'weighted_floating' if 'weighted_floating' in methods else methods[-1]}/closed_form"
+        best = next((name for name in ("nine", "weighted_floating") if name in methods), methods[-1])
+        return f"{best}/closed_form"
     errors = _errors(path, read_json(path))
     return min((name for name in errors if name in known), key=lambda name: errors[name])
 

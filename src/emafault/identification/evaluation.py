@@ -22,9 +22,9 @@ _LEAK_LIMIT = 3.0
 class FeatureSet:
     """Features of one reconstruction with their truth; ``bound`` is the Cramer-Rao standard deviation of each fault."""
 
-    features: np.ndarray  # (run, 6) or (run, 8)
+    features: np.ndarray  # (run, 6), (run, 8) or (run, 9)
     faults: np.ndarray  # (run, 6)
-    covariance: np.ndarray | None = None  # (run, 6, 6)
+    covariance: np.ndarray | None = None  # (run, 6, 6) or (run, 9, 9)
     bound: np.ndarray | None = None  # (run, 6) or (6,)
 
     def rows(self, index: Any) -> "FeatureSet":
@@ -121,7 +121,7 @@ def evaluate(
         unit = unit if unit is None or np.ndim(unit) == 1 else np.asarray(unit)[identified]
         if unit_covariance is not None and np.ndim(unit_covariance) == 3:
             unit_covariance = np.asarray(unit_covariance)[identified]
-    value = identifier.predict(fresh.features, fresh.covariance, unit)
+    value = identifier.predict(fresh.features, fresh.covariance, unit, unit_covariance)
     low, high = identifier.interval(fresh.features, level, fresh.covariance, unit, unit_covariance)
     return {
         "rows": len(value),

@@ -1,4 +1,4 @@
-"""ONNX export of a network with its scaling inside: R (ohm), k (V s/rad) in, faults in SI units out."""
+"""ONNX export of a network with its scaling inside: R (ohm), k (V s/rad), of nine L (H) in, faults in SI units out."""
 
 import warnings
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
-from .network import Network
+from .network import Network, logarithmic
 from .training import torch_layers
 
 
@@ -28,7 +28,8 @@ def torch_module(network: Network):
         def forward(self, features):
             x = features
             if self.log:
-                x = torch.cat([torch.log(x[:, :6]), x[:, 6:]], dim=1) if x.shape[1] > 6 else torch.log(x)
+                logs = logarithmic(x.shape[1])
+                x = torch.cat([torch.log(x[:, :logs]), x[:, logs:]], dim=1) if x.shape[1] > logs else torch.log(x)
             return self.layers((x - self.feature_mean) / self.feature_scale) * self.fault_scale + self.fault_mean
 
     return Identification().to(torch.float32).eval()

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,8 @@ from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
 from ..plain import array, read_json
 from .intervals import ConformalIntervals
-from .network import Network
+from .network import Network, logarithmic
+from .posterior import Knowledge, Posterior, model_error, nominal_nine, posterior
 from .settings import NetworkSettings, TrainingSettings
 from .training import TrainedNetwork, train
 
@@ -25,7 +26,7 @@ FILE = "identifier.json"
 _FORMAT = 1
 _KEYS = (
     "format", "estimator", "actuator", "alpha_m", "lag", "intervals", "network", "feature_low", "feature_high",
-    "healthy",
+    "healthy", "known",
 )  # fmt: skip
 
 
@@ -33,9 +34,11 @@ _KEYS = (
 class Identifier:
     """A trained estimator with its intervals.
 
-    Features are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c], or (run, 8) with xi_x and xi_y behind them where the
-    reconstruction measures xi by itself. A ``unit`` is the (6,) or (run, 6) array of R and k of the healthy unit at
-    20 degC: features and covariance are scaled to the nominal actuator before use.
+    Features are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c], (run, 8) with xi_x and xi_y behind them where the
+    reconstruction measures xi by itself, or (run, 9) with L_a, L_b, L_c behind them. A ``unit`` is the (6,) or (run, 6)
+    array of R and k of the healthy unit at 20 degC, of nine features (9,) or (run, 9) with L: features and covariance
+    are scaled to the nominal actuator before use. The closed form of nine features weighs them by their covariance
+    together with the unit's, or with what is ``known`` of a unit that was not measured.
     """
 
     actuator: ActuatorParameters
@@ -45,7 +48,8 @@ class Identifier:
     network: Network | None = None  # None: the closed form
     feature_low: np.ndarray | None = None  # (feature,) range of the rows learnt from
     feature_high: np.ndarray | None = None
-    healthy: np.ndarray | None = None  # (6,) R and k that it takes for healthy at 20 degC; None: the nominal ones
+    healthy: np.ndarray | None = None  # R, k (and L) that it takes for healthy at 20 degC; None: the nominal ones
+    known: Knowledge = field(default_factory=Knowledge)  # read by the closed form of nine features
 
     @property
     def estimator(self) -> str:
@@ -57,16 +61,29 @@ class Identifier:
         """Number of trained weights; 0 for the closed form."""
         return 0 if self.network is None else self.network.parameters
 
+    @property
+    def prior(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Mean and covariance of R0, k0, L0 of any unit, for ``calibrate``; None where the tolerance is not used."""
+        covariance, nominal = self.known.covariance(), nominal_nine(self.actuator)
+        nine = self.feature_low is None or len(self.feature_low) == 9
+        if self.network is not None or not nine or not np.any(covariance):
+            return None
+        return nominal, covariance * np.outer(nominal, nominal)
+
     def predict(
-        self, features: np.ndarray, covariance: np.ndarray | None = None, unit: np.ndarray | None = None
+        self,
+        features: np.ndarray,
+        covariance: np.ndarray | None = None,
+        unit: np.ndarray | None = None,
+        unit_covariance: np.ndarray | None = None,
     ) -> np.ndarray:
         """Faults (run, 6) in SI units.
 
         Raises
         ------
-        InputError : features of the wrong shape
+        InputError : features of the wrong shape, or nine without covariance for the closed form
         """
-        features, covariance = self._nominal(features, covariance, unit)
+        features, covariance = self._nominal(features, covariance, unit, unit_covariance)
         return _estimate(self, features, covariance)
 
     def interval(
@@ -79,8 +96,8 @@ class Identifier:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Low and high end (run, 6) of the prediction interval at ``level``.
 
-        ``covariance`` (run, 6, 6) of the features scales the width of each run; without it that of the calibration
-        rows is taken. ``unit_covariance``, (6, 6) or (run, 6, 6) of ``unit``, widens them.
+        ``covariance`` (run, 6, 6) of the features, or (run, 9, 9) of nine, scales the width of each run; without it
+        that of the calibration rows is taken. ``unit_covariance``, (6, 6) or (run, 6, 6) of ``unit``, widens them.
         """
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
         value = _estimate(self, features, covariance)
@@ -96,7 +113,7 @@ class Identifier:
         unit_covariance: np.ndarray | None = None,
     ) -> list[dict[str, dict[str, float]]]:
         """For each run {"Na": {"value": ..., "low": ..., "high": ...}, ...}."""
-        value = self.predict(features, covariance, unit)
+        value = self.predict(features, covariance, unit, unit_covariance)
         low, high = self.interval(features, level, covariance, unit, unit_covariance)
         return [
             {
@@ -105,6 +122,22 @@ class Identifier:
             }
             for n in range(len(value))
         ]
+
+    def model_error(
+        self,
+        features: np.ndarray,
+        covariance: np.ndarray | None,
+        unit: np.ndarray | None = None,
+        unit_covariance: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """(run,) relative error of nine features beside their noise without which no fault of the unit explains them.
+
+        Zero where noise explains them, and of six or eight features, which a fault always explains.
+        """
+        if np.shape(features)[1] != 9:
+            return np.zeros(len(features))
+        x, C = replace(self, network=None)._nominal(features, covariance, unit, unit_covariance)
+        return np.zeros(len(x)) if C is None else model_error(x, C, self.actuator, self.alpha_m, self.known)
 
     def outside(self, features: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
         """How far each run (run,) lies outside the features learnt from, as a fraction of their range; 0 is inside."""
@@ -119,20 +152,24 @@ class Identifier:
     def _nominal(self, features, covariance, unit, unit_covariance=None) -> tuple[np.ndarray, np.ndarray | None]:
         features = np.atleast_2d(np.asarray(features, float))
         width = len(self.feature_low) if self.feature_low is not None else features.shape[1]
-        if features.shape[1] != width or width not in (6, 8):
+        if features.shape[1] != width or width not in (6, 8, 9):
             raise InputError(f"features: got {features.shape[1]} a run, this identifier accepts {width}")
+        scaled = logarithmic(width)  # what a unit has a value of its own of
+        nominal = nominal_nine(self.actuator)[:scaled]
         if covariance is not None:
-            covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), 6, 6))
+            covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), scaled, scaled))
         if unit is not None:
-            unit = np.broadcast_to(np.asarray(unit, float), (len(features), 6))
-            scale = (nominal_features(self.actuator) if self.healthy is None else self.healthy) / unit
-            features = np.concatenate([features[:, :6] * scale, features[:, 6:]], axis=1)
+            unit = np.broadcast_to(np.asarray(unit, float), (len(features), scaled))
+            scale = (nominal if self.healthy is None else self.healthy) / unit
+            features = np.concatenate([features[:, :scaled] * scale, features[:, scaled:]], axis=1)
             if covariance is not None:
                 covariance = covariance * scale[:, :, None] * scale[:, None, :]
             if unit_covariance is not None:
-                share = features[:, :6] / unit  # an error of the unit's R or k is one of the scaled feature
+                share = features[:, :scaled] / unit  # an error of the unit's R or k is one of the scaled feature
                 added = np.asarray(unit_covariance, float) * share[:, :, None] * share[:, None, :]
                 covariance = added if covariance is None else covariance + added
+        elif width == 9 and self.network is None and covariance is not None:
+            covariance = covariance + self.known.covariance() * features[:, :, None] * features[:, None, :]
         return features, covariance
 
     def save(self, folder: str | Path) -> None:
@@ -153,6 +190,7 @@ class Identifier:
             "feature_low": None if self.feature_low is None else self.feature_low.tolist(),
             "feature_high": None if self.feature_high is None else self.feature_high.tolist(),
             "healthy": None if self.healthy is None else self.healthy.tolist(),
+            "known": asdict(self.known),
         }
         replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
 
@@ -192,15 +230,21 @@ def _from_plain(plain: Any) -> Identifier:
     inputs = 6 if network is None else len(network.scaler.feature_mean)
     low, high = (None if plain[key] is None else array(plain[key], key) for key in ("feature_low", "feature_high"))
     for key, values in {"feature_low": low, "feature_high": high}.items():
-        if values is not None and values.shape not in ((6,), (8,)):
+        if values is not None and values.shape not in ((6,), (8,), (9,)):
             raise InputError(f"{key}: got {shown(plain[key])}, accepted is one number for each feature")
         if network is not None and (values is None or len(values) != inputs):
             raise InputError(f"{key}: got {shown(plain[key])}, accepted are {inputs} numbers, as the network reads")
     if (low is None) != (high is None) or (low is not None and high is not None and np.any(low > high)):
         raise InputError("feature_high: is below feature_low, or one of the two is missing")
-    healthy = None if plain.get("healthy") is None else array(plain["healthy"], "healthy", (6,))
-    if healthy is not None and not np.all(healthy > 0.0):
-        raise InputError(f"healthy: got {healthy.tolist()}, accepted are R and k above 0")
+    healthy = None if plain.get("healthy") is None else array(plain["healthy"], "healthy")
+    if healthy is not None and not (healthy.shape in ((6,), (9,)) and np.all(healthy > 0.0)):
+        raise InputError(f"healthy: got {shown(plain['healthy'])}, accepted are R and k, or R, k and L, above 0")
+    known = plain.get("known", {})
+    schema.check(known, dict[str, Any], "known")
+    for key in known:
+        if key not in Knowledge.__dataclass_fields__:
+            raise InputError(schema.unknown_key(key, "known", list(Knowledge.__dataclass_fields__)))
+        schema.check(known[key], float, f"known.{key}", {} if key == "lag" else {"low": 0.0})
     return Identifier(
         ActuatorParameters(**plain["actuator"]),
         plain["alpha_m"],
@@ -210,28 +254,26 @@ def _from_plain(plain: Any) -> Identifier:
         low,
         high,
         healthy,
+        Knowledge(**known),
     )
-
-
-def nominal_features(actuator: ActuatorParameters) -> np.ndarray:
-    """R0 and k0 of the nominal actuator as six features."""
-    return np.repeat([actuator.resistance, actuator.back_emf], 3)
 
 
 def learnt_healthy(
     features: np.ndarray, faults: np.ndarray, actuator: ActuatorParameters, alpha_m: float, lag: float
 ) -> np.ndarray:
-    """(6,) R and k of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
+    """R, k and, of nine, L of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
 
     A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
     as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
     differs from 1 by more than chance; of the laws with and without xi in k the one that fits better.
     """
-    nominal = nominal_features(actuator)
+    used = logarithmic(features.shape[1])
+    nominal = nominal_nine(actuator)[:used]
     ratios = []
     for law in ("stator_fixed", "rotor_angle"):
-        true = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
-        ratios.append(features[:, :6] / np.concatenate(true, axis=1))
+        R, k = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
+        true = np.concatenate([R, k, closed_form.inductance(faults, actuator)], axis=1)
+        ratios.append(features[:, :used] / true[:, :used])
     ratio = min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
     bias = np.mean(ratio, axis=0)
     chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
@@ -241,6 +283,8 @@ def learnt_healthy(
 def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
     if identifier.network is not None:
         return identifier.network.predict(features)
+    if features.shape[1] == 9:
+        return _posterior(identifier, features, covariance).faults
     R, k, model = features[:, :3], features[:, 3:6], identifier
     if features.shape[1] == 8:
         return closed_form.inverse_rotor_angle(
@@ -249,11 +293,20 @@ def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarr
     return closed_form.inverse(R, k, model.actuator, model.alpha_m, model.lag)
 
 
+def _posterior(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> Posterior:
+    if covariance is None:
+        raise InputError("covariance: none given, the closed form of nine features weighs them by it")
+    return posterior(features, covariance, identifier.actuator, identifier.alpha_m, identifier.known)
+
+
 def _variance(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> np.ndarray | None:
-    """Variance (run, 6) that the noise of R and k makes in the estimates; None where it is not known."""
+    """Variance (run, 6) that the noise of the features makes in the estimates; None where it is not known."""
     if covariance is None or not np.any(np.isfinite(covariance)):
         return None
-    if features.shape[1] == 6:
+    if features.shape[1] == 9 and identifier.network is None:
+        found = _posterior(identifier, features, covariance)
+        return np.diagonal(found.covariance, axis1=1, axis2=2)
+    if features.shape[1] != 8:
         derivative = closed_form.jacobian(lambda x: _estimate(identifier, x), features)
     else:  # least squares takes real numbers only
         columns = []
@@ -284,6 +337,7 @@ def fit_identifier(
     *,
     alpha_m: float = 0.0,
     lag: float = 0.0,
+    known: Knowledge | None = None,
     covariance: np.ndarray | None = None,
     network: Mapping[str, Any] | NetworkSettings | None = None,
     training: Mapping[str, Any] | TrainingSettings | None = None,
@@ -298,11 +352,14 @@ def fit_identifier(
     Parameters
     ----------
     estimator : ``network`` or ``closed_form``
-    features : (run, 6) or (run, 8); faults : (run, 6)
+    features : (run, 6), (run, 8) or (run, 9); faults : (run, 6)
     alpha_m, lag : the magnets' temperature coefficient (1/K) and how much colder than the winding they are expected
         (K); the
         closed form needs them, a network learns them
-    covariance : (run, 6, 6) of R and k, to normalise the intervals; None where the reconstruction gives none
+    known : what is known beforehand, of which the closed form of nine features makes its posterior; its lag counts
+        there. Its intervals are the posterior's
+    covariance : (run, 6, 6) of R and k, to normalise the intervals, or (run, 9, 9) of nine features; None where the
+        reconstruction gives none
     intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the
         70/15/15 calibrates)
 
@@ -325,6 +382,7 @@ def fit_identifier(
         covariance = None
     placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
     identifier = Identifier(actuator, alpha_m, lag, placeholder, None, features.min(axis=0), features.max(axis=0))
+    identifier = replace(identifier, known=known or Knowledge(lag=lag))
     trained = None
     if estimator == "network":
         trained = train(features, faults, network, training, seed)
@@ -335,6 +393,8 @@ def fit_identifier(
         part = None if covariance is None else covariance[rows]
         return _estimate(model, features[rows], part) - faults[rows], _variance(model, features[rows], part)
 
+    if trained is None and features.shape[1] == 9:
+        return Fit(replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features")))
     if trained is None:
         residuals, variance = residuals_of(identifier, np.arange(len(features)))
         method = "closed form, all rows"

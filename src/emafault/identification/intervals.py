@@ -14,10 +14,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
 from ..plain import array
+
+GAUSSIAN_ROWS = 20_000  # quantiles that stand for a Gaussian
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,14 @@ class ConformalIntervals:
         scores = np.sort(np.abs(residuals) / np.sqrt(variance + missed), axis=0)
         return cls(method, scores, missed, np.median(variance, axis=0))
 
+    @classmethod
+    def gaussian(cls, method: str) -> "ConformalIntervals":
+        """Scores of Gaussian errors of exactly the variance that they are told, none being calibrated on rows."""
+        quantiles = np.sort(np.abs(norm.ppf((np.arange(GAUSSIAN_ROWS) + 0.5) / GAUSSIAN_ROWS)))
+        outputs = len(FAULT_NAMES)
+        scores = np.repeat(quantiles[:, None], outputs, axis=1)
+        return cls(method, scores, np.full(outputs, 1e-24), np.full(outputs, np.nan))
+
     def half_width(self, level: float, variance: np.ndarray | None, rows: int) -> np.ndarray:
         """Half widths (run, output) in SI units at a level, given the propagated variance of the runs or None.
 
@@ -60,8 +71,9 @@ class ConformalIntervals:
         return self.scores[rank - 1] * np.sqrt(variance + self.missed_variance)
 
     def to_plain(self) -> dict[str, Any]:
-        """Everything as plain lists."""
-        return {key: value if isinstance(value, str) else value.tolist() for key, value in vars(self).items()}
+        """Everything as plain lists; null for a typical variance that there is none of."""
+        plain = {key: value if isinstance(value, str) else value.tolist() for key, value in vars(self).items()}
+        return plain if np.all(np.isfinite(self.typical_variance)) else plain | {"typical_variance": None}
 
     @classmethod
     def from_plain(cls, plain: dict[str, Any]) -> "ConformalIntervals":
@@ -78,6 +90,9 @@ class ConformalIntervals:
             raise InputError("intervals.scores: accepted are rows of scores from 0 up, sorted")
         variances = {}
         for key in ("missed_variance", "typical_variance"):
+            if key == "typical_variance" and plain[key] is None:  # each run tells its own
+                variances[key] = np.full(6, np.nan)
+                continue
             variances[key] = array(plain[key], f"intervals.{key}", (6,))
             if np.any(variances[key] < 0.0):
                 raise InputError(f"intervals.{key}: got {variances[key].tolist()}, accepted are numbers from 0")

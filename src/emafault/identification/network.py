@@ -14,7 +14,7 @@ from .settings import NetworkSettings
 
 @dataclass(frozen=True)
 class Scaler:
-    """Coordinates of the features (linear, or the log of R and k), standardised; standardised targets."""
+    """Coordinates of the features (linear, or the log of R, k and L), standardised; standardised targets."""
 
     coordinates: str
     feature_mean: np.ndarray  # (feature,)
@@ -47,7 +47,7 @@ class Scaler:
 
 
 def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
-    """The features as they are, or with R and k (the first six) in logarithms.
+    """The features as they are, or with R, k and L, which are all of them but a measured xi, in logarithms.
 
     Raises
     ------
@@ -55,13 +55,19 @@ def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
     """
     if coordinates == "linear":
         return features
-    if np.any(np.real(features[:, :6]) <= 0.0):
-        row, column = np.argwhere(np.real(features[:, :6]) <= 0.0)[0]
-        name = ("R_a", "R_b", "R_c", "k_a", "k_b", "k_c")[column]
+    logs = logarithmic(features.shape[1])
+    if np.any(np.real(features[:, :logs]) <= 0.0):
+        row, column = np.argwhere(np.real(features[:, :logs]) <= 0.0)[0]
+        name = [f"{quantity}_{phase}" for quantity in "RkL" for phase in "abc"][column]
         raise InputError(
             f"features: {name} of run {row} is {np.real(features[row, column]):.4g}, accepted are values above 0"
         )
-    return np.concatenate([np.log(features[:, :6]), features[:, 6:]], axis=1)
+    return np.concatenate([np.log(features[:, :logs]), features[:, logs:]], axis=1)
+
+
+def logarithmic(width: int) -> int:
+    """How many of ``width`` features, the first of them, are R, k or L: all nine, or six before a measured xi."""
+    return 9 if width == 9 else 6
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..errors import InputError
-from ..io.recording import Recording
+from ..io.recording import PHASES, Recording
 from ..io.sensors import refuse_mistaken
 from ..reconstruction import Features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
+from .posterior import CHANCE
 
 #: what a fault vector's components can be of any machine, a unit off nominal allowed for
 POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
+#: relative error of R, k and L beside their noise up to which intervals are widened; beyond it nothing is identified
+LARGEST_MODEL_ERROR = 0.1
 
 
 @dataclass(frozen=True)
@@ -69,17 +73,62 @@ def identify_recordings(
         healthy = reconstruct_recordings(reference, model.method, identifier.actuator, model.settings)
         ambient = np.array([recording.ambient_temperature for recording in reference])
         options = {"ambient_error": model.ambient_error, "alpha_m": identifier.alpha_m}
-        found = calibrate(healthy, ambient, identifier.actuator, **options)
+        found = calibrate(healthy, ambient, identifier.actuator, prior=identifier.prior, **options)
         unit, covariance = found.unit, found.covariance if np.all(np.isfinite(found.covariance)) else None
     estimates, notes = [], []
     for recording, own in zip(recordings, features, strict=True):
-        inputs = _inputs(own)
-        noise = own.covariance if np.all(np.isfinite(own.covariance)) else None
+        inputs, noise = own.inputs, own.inputs_covariance if np.all(np.isfinite(own.inputs_covariance)) else None
+        noise, said = _with_misfit(recording.name, own, noise, identifier, unit, covariance)
         estimates += identifier.estimate(inputs, level, noise, unit, covariance)
         _refuse_impossible(recording.name, estimates[-1])
         beyond = float(identifier.outside(inputs, unit)[0])
-        notes.append(f"features lie {beyond:.0%} of their range outside what was learnt from" if beyond > 0.05 else "")
+        if beyond > 0.05:
+            said.append(f"features lie {beyond:.0%} of their range outside what was learnt from")
+        notes.append("; ".join(said))
     return Identified(estimates, notes)
+
+
+def _with_misfit(
+    name: str,
+    own: Features,
+    noise: np.ndarray | None,
+    identifier: Identifier,
+    unit: np.ndarray | None,
+    unit_covariance: np.ndarray | None,
+) -> tuple[np.ndarray | None, list[str]]:
+    """Covariance of a recording's nine features with what its equations and laws leave unexplained, and that in words.
+
+    Raises
+    ------
+    InputError : coefficients that no fault of this actuator has
+    """
+    said: list[str] = []
+    if noise is None or "fit" not in own.extras:
+        return noise, said
+    fit, freedom = own.extras["fit"][0], own.extras["freedom"][0]
+    if np.any(np.isnan(fit)):
+        said.append(
+            "no end currents are recorded, the inductance is not told: intervals are about those of six features"
+        )
+    poor = np.flatnonzero(fit * freedom > chi2.isf(CHANCE, np.maximum(freedom, 1)))
+    if len(poor):
+        # Cauchy and Schwarz: a misfit of chi-squared x beyond noise moves no estimate by more than x^0.5 of its errors
+        noise = noise * (1.0 + float(np.sum((fit[poor] - 1.0) * freedom[poor])))
+        phases = ", ".join(PHASES[j] for j in poor)
+        said.append(
+            f"the voltage of phase {phases} does not fit its equation (chi-squared {np.max(fit[poor]):.2g} per degree "
+            "of freedom): intervals are widened by what that can do at most"
+        )
+    off = float(identifier.model_error(own.inputs, noise, unit, unit_covariance)[0])
+    if off > LARGEST_MODEL_ERROR:
+        raise InputError(
+            f"{name}: R, k and L of the phases fit no fault of this actuator by {off:.0%}; the recording is of another "
+            "unit or its sensors are off, --reference calibrates on healthy recordings"
+        )
+    if off:
+        noise = noise + np.eye(9) * (off * own.inputs) ** 2
+        said.append(f"R, k and L fit no fault of this unit by {off:.2g} of their values: intervals are widened")
+    return noise, said
 
 
 def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -> None:
@@ -91,8 +140,3 @@ def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -
                 f"{name}: {component} would be {found['value']:.4g}{units}, possible is {low:g} to {high:g}{units}; "
                 "the recording's units, signs or phases are mistaken, or it is of another actuator"
             )
-
-
-def _inputs(features: Features) -> np.ndarray:
-    xi = features.extras.get("xi")
-    return features.six if xi is None else np.concatenate([features.six, xi], axis=1)

@@ -8,6 +8,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .angle_resolved import reconstruct_angle_resolved
 from .features import Features, Signals, join_features, read_signals
+from .nine import reconstruct_nine
 from .paper import reconstruct_paper
 from .weighted import reconstruct_weighted
 
@@ -17,6 +18,7 @@ METHODS: dict[str, Callable[[Signals, ActuatorParameters, Mapping], Features]] =
     "paper": reconstruct_paper,
     "weighted": reconstruct_weighted,
     "angle_resolved": reconstruct_angle_resolved,
+    "nine": reconstruct_nine,
 }
 
 

@@ -2,8 +2,9 @@
 
 A real unit is off nominal by more than a fault's signature. Its R and k at the reference temperature, phase by phase,
 are the mean over healthy recordings of R_j/(1 + alpha dT) and k_j/(1 + alpha_m dT), weighted by the features'
-covariance. The error of the measured ambient temperature (one a recording, shared by the phases) and what "healthy"
-leaves open are in the uncertainty.
+covariance; L, of a method that gives its covariance, does not change with temperature. The error of the measured
+ambient temperature (one a recording, shared by the phases) and what "healthy" leaves open are in the uncertainty. What
+is known of any unit beforehand, its tolerance, counts as one measurement more.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,17 +27,17 @@ class Calibration:
     R0: np.ndarray  # (phase,) ohm
     k0: np.ndarray  # (phase,) V s/rad
     L0: np.ndarray  # (phase,) H, NaN where the method does not estimate it
-    covariance: np.ndarray  # (6, 6) of [R0, k0]; NaN where it cannot be told
+    covariance: np.ndarray  # (6, 6) of [R0, k0], (9, 9) with L0 where its own is known; NaN where it cannot be told
     recordings: int
 
     @property
     def unit(self) -> np.ndarray:
-        """(6,) [R0_a, R0_b, R0_c, k0_a, k0_b, k0_c]."""
-        return np.concatenate([self.R0, self.k0])
+        """(6,) [R0_a, R0_b, R0_c, k0_a, k0_b, k0_c], or (9,) with L0 behind them, as ``covariance`` has them."""
+        return np.concatenate([self.R0, self.k0, self.L0])[: len(self.covariance)]
 
     @property
     def standard_error(self) -> np.ndarray:
-        """(6,) standard errors of ``unit``."""
+        """Standard errors of ``unit``."""
         return np.sqrt(np.diagonal(self.covariance))
 
     def actuator(self, nominal: ActuatorParameters) -> ActuatorParameters:
@@ -54,11 +55,12 @@ class Calibration:
 
         That uncertainty is common to all recordings of the unit: their mean does not average it out.
         """
-        scale = np.repeat([nominal.resistance, nominal.back_emf], 3) / self.unit
+        unit = self.unit[:6]
+        scale = np.repeat([nominal.resistance, nominal.back_emf], 3) / unit
         six = features.six * scale
         own = propagate(features.covariance, np.diag(scale))
-        relative = six / self.unit
-        shared = self.covariance * relative[:, :, None] * relative[:, None, :]
+        relative = six / unit
+        shared = self.covariance[:6, :6] * relative[:, :, None] * relative[:, None, :]
         return replace(features, R=six[:, :3], k=six[:, 3:], covariance=own + shared)
 
 
@@ -70,8 +72,9 @@ def calibrate(
     ambient_error: float = 0.5,
     alpha_m: float = 0.0,
     healthy_within: float = 1e-3,
+    prior: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Calibration:
-    """Estimate a unit's R0 and k0 from features of healthy recordings.
+    """Estimate a unit's R0 and k0, and L0 where the features have its covariance, from healthy recordings.
 
     Parameters
     ----------
@@ -80,6 +83,7 @@ def calibrate(
     ambient_error : its standard deviation (K)
     alpha_m : temperature coefficient of the magnets, at the winding's temperature (1/K)
     healthy_within : largest N and xi that still count as healthy, taken as uniform (1)
+    prior : mean (9,) and covariance (9, 9) of [R0, k0, L0] (SI) that is known of any unit; None knows nothing
 
     Raises
     ------
@@ -89,24 +93,34 @@ def calibrate(
     if not np.any(good):
         raise InputError("calibration: none of the healthy recordings determines R and k of all three phases")
     dT = np.atleast_1d(np.asarray(ambient_temperature, float))[good] - actuator.reference_temperature
-    alpha = np.repeat([actuator.copper_coefficient, alpha_m], 3)
-    warmth = 1.0 + alpha * dT[:, None]  # (run, 6)
-    at_reference = features.six[good] / warmth
+    own = features.inputs_covariance[good]
+    width = own.shape[1]  # six or nine
+    alpha = np.repeat([actuator.copper_coefficient, alpha_m, 0.0], 3)[:width]
+    warmth = 1.0 + alpha * dT[:, None]  # (run, width)
+    at_reference = features.nine[good, :width] / warmth
     n = len(dT)
-    if np.all(np.isfinite(features.covariance[good])):
+    fault = np.zeros((width, 5))  # derivative of the healthy features, relative, by N and xi
+    for quantity in range(width // 3):
+        fault[3 * quantity : 3 * quantity + 3, :3] = -np.eye(3) * (2.0 if quantity == 2 else 1.0)
+    fault[3:6, 3:] = ECCENTRICITY_AXES
+    if np.all(np.isfinite(own)):
         slope = at_reference * alpha / warmth * ambient_error  # change per standard deviation of the temperature
-        each = propagate(features.covariance[good], np.eye(6) / warmth[:, :, None])
+        each = propagate(own, np.eye(width) / warmth[:, :, None])
         weight = np.linalg.inv(each + slope[:, :, None] * slope[:, None, :])
         covariance = np.linalg.inv(np.sum(weight, axis=0))
         unit = covariance @ np.sum(weight @ at_reference[..., None], axis=0)[:, 0]
     else:
         unit = np.mean(at_reference, axis=0)
-        covariance = np.cov(at_reference, rowvar=False) / n if n > 1 else np.full((6, 6), np.nan)
-    fault = np.zeros((6, 5))  # derivative of the healthy features by N and xi
-    fault[:3, :3], fault[3:, :3] = -np.diag(unit[:3]), -np.diag(unit[3:])
-    fault[3:, 3:] = unit[3:, None] * ECCENTRICITY_AXES
+        covariance = np.cov(at_reference, rowvar=False) / n if n > 1 else np.full((width, width), np.nan)
+    fault *= unit[:, None]
     covariance = covariance + healthy_within**2 / 3.0 * fault @ fault.T
-    return Calibration(unit[:3], unit[3:], np.mean(features.L[good], axis=0), covariance, n)
+    if prior is not None:
+        # by the gain, as a tolerance that the phases have in common has no inverse
+        mean, spread = prior[0][:width], prior[1][:width, :width]
+        gain = spread @ np.linalg.inv(spread + covariance)
+        unit, covariance = mean + gain @ (unit - mean), spread - gain @ spread
+    L0 = unit[6:] if width == 9 else np.mean(features.L[good], axis=0)
+    return Calibration(unit[:3], unit[3:6], L0, covariance, n)
 
 
 def reconstruct_recordings(
@@ -140,7 +154,7 @@ def calibrate_recordings(
     actuator: ActuatorParameters,
     method: str = "weighted",
     settings: Mapping[str, Any] | None = None,
-    **options: float,
+    **options: Any,
 ) -> Calibration:
     """Calibrate a unit on healthy recordings; ``options`` are those of ``calibrate``.
 

@@ -33,6 +33,28 @@ class Features:
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
     @property
+    def nine(self) -> np.ndarray:
+        """(run, 9) R, k and L of phases a, b, c."""
+        return np.concatenate([self.R, self.k, self.L], axis=1)
+
+    @property
+    def nine_error(self) -> np.ndarray:
+        """(run, 9) standard errors of ``nine``, of a method that gives their covariance."""
+        return np.sqrt(np.diagonal(self.extras["nine_covariance"], axis1=1, axis2=2))
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """(run, 6) R and k, (run, 8) xi behind them where it is measured by itself, or (run, 9) R, k and L."""
+        if "nine_covariance" in self.extras:
+            return self.nine
+        return self.six if "xi" not in self.extras else np.concatenate([self.six, self.extras["xi"]], axis=1)
+
+    @property
+    def inputs_covariance(self) -> np.ndarray:
+        """(run, 9, 9) of ``nine`` where a method gives it, else (run, 6, 6) of ``six``."""
+        return self.extras.get("nine_covariance", self.covariance)
+
+    @property
     def identified(self) -> np.ndarray:
         """(run,) whether the record held enough to estimate all six."""
         return np.all(np.isfinite(self.six), axis=1)

@@ -8,7 +8,13 @@ import matplotlib.pyplot as plt
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 #: one colour a reconstruction; others take the remaining ones in turn
-COLOURS = {"paper": "#b5651d", "weighted": "#4c78a8", "weighted_floating": "#2a9d8f", "angle_resolved": "#7b5ea7"}
+COLOURS = {
+    "paper": "#b5651d",
+    "weighted": "#4c78a8",
+    "weighted_floating": "#2a9d8f",
+    "angle_resolved": "#7b5ea7",
+    "nine": "#c2185b",
+}
 PHASE_COLOURS = ("#d1495b", "#2e86ab", "#3d9970")
 GREY = "#8a8a8a"
 LABELS = {"Na": "$N_a$", "Nb": "$N_b$", "Nc": "$N_c$", "xi_x": r"$\xi_x$", "xi_y": r"$\xi_y$", "dT": r"$\Delta T$ (K)"}

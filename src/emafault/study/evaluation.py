@@ -17,33 +17,40 @@ from ..reconstruction.calibration import calibrate
 from .features import FeatureTable, read_features
 from .networks import HISTORY, folders, seed_folder, width_of, write_json
 
+BOUNDS = ("plateau", "floating", "recording")
 FEW = 10  # rows of the paper's external validation
 _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
 
 
 def read_bound(path: str | Path) -> dict[str, np.ndarray | None]:
-    """``plateau`` and ``floating`` -> (6,) Cramer-Rao standard deviation averaged over runs, None where none holds."""
+    """Each bound of ``features.compute_bound`` -> (6,) standard deviation averaged over runs, None where none holds."""
     import xarray as xr
 
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
-            means = {name: np.mean(data[name].values, axis=0) for name in ("plateau", "floating")}
+            means = {name: np.mean(data[name].values, axis=0) for name in BOUNDS}
     except (OSError, KeyError) as error:
         raise InputError(f"{path}: not a readable bound ({error})") from error
     return {name: mean if np.all(np.isfinite(mean)) else None for name, mean in means.items()}
 
 
-def healthy_units(reference: FeatureTable, units: int, spec: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC from its healthy recordings, and their covariance."""
+def healthy_units(
+    reference: FeatureTable, units: int, spec: Mapping[str, Any], prior: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC from its healthy recordings, and their covariance.
+
+    Of nine features (unit, 9), with L (H). ``prior`` is what is known of any unit, as of ``calibrate``.
+    """
     actuator = ActuatorParameters(**spec["actuator"])
-    options = {"ambient_error": spec["ambient_error"], "alpha_m": spec["magnet_coefficient"]}
-    six, covariance = np.full((units, 6), np.nan), np.full((units, 6, 6), np.nan)
+    options = {"ambient_error": spec["ambient_error"], "alpha_m": spec["magnet_coefficient"], "prior": prior}
+    width = reference.features.inputs_covariance.shape[1]
+    found_unit, covariance = np.full((units, width), np.nan), np.full((units, width, width), np.nan)
     for unit, rows in enumerate(np.arange(len(reference.faults)).reshape(units, -1)):
         own = reference.rows(rows)
         if np.any(own.features.identified):
             found = calibrate(own.features, own.ambient_temperature, actuator, **options)
-            six[unit], covariance[unit] = found.unit, found.covariance
-    return six, covariance
+            found_unit[unit], covariance[unit] = found.unit, found.covariance
+    return found_unit, covariance
 
 
 def _identifiers(folder: Path) -> list[Identifier]:
@@ -78,11 +85,8 @@ def evaluate_identification(
     variables: dict[str, Any] = {}
     for folder in folders(histories):
         method, estimator = folder.parent.name, folder.name
-        plateau_only = spec["plateau_only"].get(method, False)
         table = tables[method]
-        data = FeatureSet(
-            table.inputs, table.faults, table.covariance, bounds["plateau" if plateau_only else "floating"]
-        )
+        data = FeatureSet(table.inputs, table.faults, table.covariance, bounds[spec["bounds"][method]])
         models = _identifiers(folder)
         entry: dict[str, Any] = {
             "method": method,
@@ -90,10 +94,11 @@ def evaluate_identification(
             "seeds": len(models),
             "parameters": models[0].parameters,
             "intervals": models[0].intervals.method,
+            "bound": spec["bounds"][method],
         }
         calibrations: dict[str, tuple] = {"": (None, None)}
         if method in units:
-            calibrations["_calibrated"] = healthy_units(units[method], len(table.faults), spec)
+            calibrations["_calibrated"] = healthy_units(units[method], len(table.faults), spec, models[0].prior)
         for name, (unit, covariance) in calibrations.items():
             known = np.all(np.isfinite(data.features), axis=1)
             if unit is not None:
@@ -107,7 +112,7 @@ def evaluate_identification(
                 for seed in range(spec["draws"])
             )
             entry["unidentified"] = int(np.sum(~known))
-            value = models[0].predict(rows.features, rows.covariance, unit)
+            value = models[0].predict(rows.features, rows.covariance, unit, covariance)
             low, high = models[0].interval(rows.features, spec["level"], rows.covariance, unit, covariance)
             for kind, values in {"value": value, "low": low, "high": high, "truth": rows.faults}.items():
                 full = np.full((len(known), 6), np.nan)

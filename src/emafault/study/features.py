@@ -30,14 +30,15 @@ class FeatureTable:
 
     @property
     def inputs(self) -> np.ndarray:
-        """(run, 6) R and k, or (run, 8) with xi behind them where the method measures xi by itself."""
-        xi = self.features.extras.get("xi")
-        return self.features.six if xi is None else np.concatenate([self.features.six, xi], axis=1)
+        """What is identified from, see ``Features.inputs``."""
+        return self.features.inputs
 
     @property
     def covariance(self) -> np.ndarray | None:
-        """(run, 6, 6) of R and k, None where the method gives none."""
-        return self.features.covariance if np.all(np.isfinite(self.features.covariance)) else None
+        """(run, 6, 6) of R and k, or (run, 9, 9) with L; None where the method gives none."""
+        covariance = self.features.inputs_covariance
+        known = self.features.identified
+        return covariance if np.any(known) and np.all(np.isfinite(covariance[known])) else None
 
     def identified(self) -> "FeatureTable":
         """The runs whose records held enough to estimate all features."""
@@ -132,7 +133,7 @@ def _create(file, variables: Mapping[str, tuple[tuple[str, ...], np.ndarray, dic
 
 
 def read_features(path: str | Path) -> FeatureTable:
-    """Read what ``write_features`` wrote; of the extras only ``xi``, which is learnt from.
+    """Read what ``write_features`` wrote; of the extras only what is identified from.
 
     Raises
     ------
@@ -144,7 +145,8 @@ def read_features(path: str | Path) -> FeatureTable:
         raise InputError(f"{path}: no such file")
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
-            extras = {"xi": data["extra_xi"].values} if "extra_xi" in data.variables else {}
+            kept = ("xi", "nine_covariance")
+            extras = {name: data[f"extra_{name}"].values for name in kept if f"extra_{name}" in data.variables}
             R, k, L, offset, covariance = (data[n].values for n in (*_UNITS, "covariance"))
             features = Features(R, k, L, offset, covariance, extras)
             return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
@@ -153,9 +155,12 @@ def read_features(path: str | Path) -> FeatureTable:
 
 
 def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
-    """Cramer-Rao standard deviations of the first fresh runs' faults, from plateau samples and with floating ones too.
+    """Cramer-Rao standard deviations of the first fresh runs' faults.
 
-    They are NaN where the bound does not hold: without noise, and under the rotor-angle laws, whose R, k carry no xi.
+    ``plateau`` and ``floating`` are those of six features, from plateau samples and with floating ones too;
+    ``recording`` is that of all intervals of the recording with L among the coefficients, and with what is known of R0,
+    k0, L0 and the magnets' lag beforehand. They are NaN where the bounds do not hold: without noise, and under the
+    rotor-angle laws, whose R, k carry no xi.
 
     Parameters
     ----------
@@ -170,7 +175,8 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     from ..actuator.commands import command_positions
     from ..actuator.simulate import simulate
     from ..actuator.unlisted import in_machine
-    from ..reconstruction.bounds import cramer_rao_bound
+    from ..identification.posterior import Knowledge, nine_forward, posterior
+    from ..reconstruction.bounds import cramer_rao_bound, nine_bound
 
     part = spec["dataset"]
     recording, settings = part["recording"], dict(part["command"])
@@ -180,8 +186,9 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     )
     sample = sample_runs(part)
     runs, faults = sample.records(slice(spec["runs"])), sample.faults[: spec["runs"]]
-    actuator = ActuatorParameters(**part["actuator"])
-    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": []}
+    actuator, known = ActuatorParameters(**part["actuator"]), Knowledge(**spec["known"])
+    alpha_m = spec["magnet_coefficient"]
+    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": [], "recording": []}
     holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
     for start in progress(range(0, len(runs), BLOCK), "bound", -(-len(runs) // BLOCK)):
         if not holds:
@@ -190,13 +197,19 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
             continue
         some = runs[start : start + BLOCK]
         terms = in_machine(part.get("unlisted", ()), len(some), part["seed"], start)
-        clean = simulate(some, command, recording["duration"], recording["interval"], terms=terms)
-        for name, parts in found.items():
+        interval, noise = recording["interval"], part["sensors"]
+        clean = simulate(some, command, recording["duration"], interval, terms=terms)
+        for name in ("plateau", "floating"):
             choice = {"discard": spec["discard"], "floating": name == "floating"}
-            bound = cramer_rao_bound(
-                clean, recording["interval"], actuator, part["sensors"], choice, spec["magnet_coefficient"]
-            )
-            parts.append(bound.standard_error)
+            bound = cramer_rao_bound(clean, interval, actuator, noise, choice, alpha_m)
+            found[name].append(bound.standard_error)
+        nine = nine_bound(clean, interval, actuator, noise, {"discard": spec["discard"]})
+        rows = slice(start, start + len(nine))
+        true = nine_forward(faults[rows], actuator, alpha_m, sample.dT_magnet[rows])
+        least = posterior(
+            true, nine + known.covariance() * true[:, :, None] * true[:, None, :], actuator, alpha_m, known
+        )
+        found["recording"].append(np.sqrt(np.diagonal(least.covariance, axis1=1, axis2=2)))
     data = xr.Dataset(
         {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
         | {"fault": (("run", "component"), faults)},

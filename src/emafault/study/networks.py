@@ -12,6 +12,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
+from ..identification.posterior import Knowledge
 from ..identification.search import SearchSettings, choose, run_worker, summarise
 from ..io.atomic import write_text
 from ..plain import read_json
@@ -53,7 +54,8 @@ def _fit(estimator: str, table: FeatureTable, spec: Mapping[str, Any], seed: int
         table.faults,
         ActuatorParameters(**spec["actuator"]),
         alpha_m=spec["magnet_coefficient"],
-        lag=spec["magnet_lag"],
+        lag=spec["known"]["lag"],
+        known=Knowledge(**spec["known"]),
         covariance=table.covariance,
         network=spec.get("network"),
         training=spec.get("training"),

@@ -1,0 +1,393 @@
+"""R_j, k_j and L_j of the three phases together, from every interval of a record.
+
+Over an interval of length h the mean voltage equation is exact, through commutations and standstill too:
+
+    V_j = R_j i_j + L_j (i_end - i_start)/h + k_j (F(end) - F(start))/(p h) + c_j
+
+with F the integral of the trapezoid over the electrical angle; c_j stands where the phase carries current. Beside
+``weighted`` this uses the intervals in which a phase commutates, where its current falls by all of its value, and that
+the currents sum to zero: of two conducting phases each sees the other's current, which halves the variance of the
+measured one. The standard error of L_j falls by 40 %, and L_j = L0 (1 - N_j)^2 tells the shorted turns.
+
+Currents stand in regressor and residual. The regressors are therefore the best estimates of the true currents under the
+equations (measured ones less their covariance with the residual times Omega^-1 residual), whose errors are independent
+of the residual, so that the estimate is unbiased by noise (Stefanski and Carroll, Biometrika 74, 1987, 703). Omega is
+block-tridiagonal: three phases share the noise of their currents, neighbouring intervals that of an end current. The
+sum of zero leaves each instant the noise covariance sigma^2 (I - 1 1'/m) among the m phases that conduct.
+
+The angle turned comes from the recorded angles and speeds together. The noise that this leaves in the speed counts as
+white in Omega, where what is left out would bias L. It has no slow part, though, and k is told by slow parts alone: the
+estimate's covariance is that of the other noise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from ..actuator.parameters import ActuatorParameters
+from ..closed_form import PHASE_AXIS
+from ..compiled import compiled
+from ..equations.shape import trapezoid_swept
+from .features import Features, Signals, check_number, read_settings
+from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
+from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise
+from .rows import OFF_HALF_WIDTH, is_zero
+from .weighted import LOOSE_INDUCTANCE, WeightedSettings, fit_runs
+
+STRETCH = np.pi / 12.0  # electrical rad, of rotor angle over which residuals are averaged to judge the fit
+PASSES = 2  # with corrected regressors; a third changes less than a thousandth of a standard error
+FEWEST_FLOATING = 10  # samples of a phase, to tell its offset and the currents' noise
+CLEAR = np.deg2rad(0.2)  # electrical angle kept clear of the edges of the off sector, for the angle's noise
+STANDSTILL = 1e-3  # rad/s
+UNKNOWNS = 12  # R, k, L and c, three phases each
+NEGLIGIBLE = 1e-100  # what has died away is cut off, as denormal numbers slow everything after them down
+
+
+@dataclass(frozen=True)
+class NineSettings:
+    """Settings of ``nine``."""
+
+    discard: float = 0.0  # s, dropped at the start
+    plateau_width: float = 120.0  # electrical degrees
+    zero_current: float = 0.2  # A, largest measured current that may count as zero
+    noise: Mapping[str, float] | None = None  # voltage, current, current_end, speed (SI, 1 sigma); None estimates them
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run's intervals as the equations need them; row n runs from instant n to instant n + 1."""
+
+    V: np.ndarray  # (row, phase) V
+    i: np.ndarray  # (row, phase) A, mean currents that sum to zero, zero where floating
+    end: np.ndarray  # (row + 1, phase) A, likewise, at the instants
+    emf: np.ndarray  # (row, phase) rad/s, mean of f w
+    f: np.ndarray  # (row, phase) mean of f over the angle turned
+    live: np.ndarray  # (row, phase) bool: not floating
+    live_end: np.ndarray  # (row + 1, phase) bool
+    stretch: np.ndarray  # (row,) number of the stretch of rotor angle in which the row begins
+    noise: NoiseLevels  # as the record tells it, the voltage's apart
+    interval: float  # s
+
+
+@dataclass(frozen=True)
+class NineFit:
+    """Estimate of one run."""
+
+    beta: np.ndarray  # (4, phase) R, k, L, c
+    covariance: np.ndarray  # (9, 9) of [R, k, L]
+    chi2: np.ndarray  # (phase,) residual variance over the one expected
+    fit: np.ndarray  # mean square of the stretches' standardised mean residuals, (phase,), 1 where the equation holds
+    freedom: np.ndarray  # (phase,) its degrees of freedom
+
+
+@compiled
+def share(live, out):
+    """Fill ``out`` (3, 3) with I - 1 1'/m among the m live phases: covariance of currents that sum to zero."""
+    m = 0
+    for j in range(3):
+        if live[j]:
+            m += 1
+    for a in range(3):
+        for b in range(3):
+            both = live[a] and live[b]
+            out[a, b] = ((1.0 if a == b else 0.0) - 1.0 / m) if both else 0.0
+
+
+@compiled
+def factor(R, lever, slope, live, live_end, voltage, current, current_end, speed):
+    """Factors of the rows' noise covariance Omega = T T': diagonal blocks C (lower) and blocks G before them.
+
+    Parameters
+    ----------
+    R : (phase,) ohm; lever : (phase,) L/interval (ohm)
+    slope : (row, phase) change of the voltage with speed (V s/rad)
+    voltage, current, current_end, speed : 1 sigma (V, A, A, rad/s)
+    """
+    rows = len(live)
+    C, G = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
+    mean, start, stop = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    share(live_end[0], start)
+    for n in range(rows):
+        share(live[n], mean)
+        share(live_end[n + 1], stop)
+        c, g = C[n], G[n]
+        if n > 0:  # g = B C'^-1 with B the covariance of this row's phases with those of the row before
+            before = C[n - 1]
+            for a in range(3):
+                for b in range(3):
+                    x = -lever[a] * lever[b] * current_end**2 * start[a, b]
+                    for l in range(b):
+                        x -= g[a, l] * before[b, l]
+                    g[a, b] = x / before[b, b]
+        for a in range(3):
+            for b in range(a + 1):
+                x = R[a] * R[b] * current**2 * mean[a, b]
+                x += lever[a] * lever[b] * current_end**2 * (start[a, b] + stop[a, b])
+                x += slope[n, a] * slope[n, b] * speed**2
+                if a == b:
+                    x += voltage**2
+                for l in range(3):
+                    x -= g[a, l] * g[b, l]
+                for l in range(b):
+                    x -= c[a, l] * c[b, l]
+                c[a, b] = np.sqrt(x) if a == b else x / c[b, b]
+        start, stop = stop, start
+    return C, G
+
+
+@compiled
+def forward(C, G, table):
+    """T^-1 table, ``table`` (row, phase, column)."""
+    rows, _, columns = table.shape
+    out = np.empty((rows, 3, columns))
+    for n in range(rows):
+        for a in range(3):
+            for q in range(columns):
+                x = table[n, a, q]
+                if n > 0:
+                    for l in range(3):
+                        x -= G[n, a, l] * out[n - 1, l, q]
+                for l in range(a):
+                    x -= C[n, a, l] * out[n, l, q]
+                x /= C[n, a, a]
+                out[n, a, q] = x if abs(x) > NEGLIGIBLE else 0.0
+    return out
+
+
+@compiled
+def backward(C, G, table):
+    """T'^-1 table, ``table`` (row, phase)."""
+    rows = len(table)
+    out = np.empty((rows, 3))
+    for n in range(rows - 1, -1, -1):
+        for a in range(2, -1, -1):
+            x = table[n, a]
+            if n + 1 < rows:
+                for l in range(3):
+                    x -= G[n + 1, l, a] * out[n + 1, l]
+            for l in range(a + 1, 3):
+                x -= C[n, l, a] * out[n, l]
+            out[n, a] = x / C[n, a, a]
+    return out
+
+
+@compiled
+def project(values, live):
+    """(row, phase) values with the mean over the live phases taken off, zero where not live."""
+    out = np.zeros(values.shape)
+    for n in range(len(values)):
+        total, m = 0.0, 0
+        for j in range(3):
+            if live[n, j]:
+                total += values[n, j]
+                m += 1
+        for j in range(3):
+            if live[n, j]:
+                out[n, j] = values[n, j] - total / m
+    return out
+
+
+def angles_turned(speed: np.ndarray, angle: np.ndarray, interval: float) -> tuple[np.ndarray, float]:
+    """(time,) rotor angles (rad) at the intervals' ends from recorded angles and speeds together; their rate's noise.
+
+    Both noises are told by the difference of speed and rate of the angle: that of the angle makes neighbours
+    anti-correlated. The rate's noise (rad/s) is the mean of 1/(1/s^2 + 1/(4 a^2 sin^2(x/2))) over frequencies x, with s
+    that of the speed and a that of an angle over the interval.
+    """
+    difference = speed[1:] - np.diff(angle) / interval
+    difference = difference - np.mean(difference)
+    of_angle = max(-float(np.mean(difference[1:] * difference[:-1])), 0.0)  # variance of an angle over interval^2
+    of_speed = float(np.mean(difference**2)) - 2.0 * of_angle
+    if of_angle <= 1e-12 * max(of_speed, 0.0) or of_angle < 1e-18:
+        return angle, 0.0
+    of_speed = max(of_speed, 1e-6 * of_angle)
+    ratio = of_angle / of_speed
+    band = np.zeros((2, len(angle)))
+    band[0] = 1.0 + 2.0 * ratio
+    band[0, [0, -1]] = 1.0 + ratio
+    band[1, :-1] = -ratio
+    right = angle.copy()
+    right[1:] += ratio * interval * speed[1:]
+    right[:-1] -= ratio * interval * speed[1:]
+    left = of_speed * (1.0 - 1.0 / np.sqrt(1.0 + 4.0 * ratio))
+    return solveh_banded(band, right, lower=True, check_finite=False), float(np.sqrt(left))
+
+
+def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: NineSettings) -> Record | None:
+    """Rows of one run; None where a phase never floats, so that its sensor's offset is not told.
+
+    ``signals`` must hold end currents.
+    """
+    h, p = signals.interval, float(actuator.pole_pairs)
+    first = max(round(s.discard / h), 1)
+    angle, rate_noise = angles_turned(signals.speed[run], signals.angle[run], h)
+    x = p * angle[:, None] - PHASE_AXIS
+    ramp = max(0.5 * (np.pi - np.deg2rad(s.plateau_width)), 1e-9)
+    swept = np.stack([trapezoid_swept(np.ascontiguousarray(x[:, j]), ramp)[0] for j in range(3)], axis=1)
+    i, end = signals.current[run].copy(), signals.current_end[run].copy()  # type: ignore[index]
+    floating = np.zeros(i.shape, bool)
+    scatter = np.zeros((2, 3))
+    for j in range(3):
+        inside = np.abs(x[:, j] - np.pi * np.round(x[:, j] / np.pi)) <= OFF_HALF_WIDTH - CLEAR
+        rows = 1 + np.flatnonzero(inside[1:] & inside[:-1])
+        zero = is_zero(i[rows, j], s.zero_current) & is_zero(end[rows, j], s.zero_current)
+        zero &= is_zero(end[rows - 1, j], s.zero_current)
+        # the last of a fading current hides in the noise: where it may have faded within an interval, it is measured
+        sure = zero & np.concatenate([[False], zero[:-1]]) & (np.diff(rows, prepend=-1) == 1)
+        rows = rows[sure if np.sum(sure) >= FEWEST_FLOATING else zero]
+        if len(rows) < FEWEST_FLOATING:
+            return None
+        floating[rows, j] = True
+        for values, n in ((i, 0), (end, 1)):
+            values[:, j] -= np.mean(values[rows, j])
+            scatter[n, j] = np.mean(values[rows, j] ** 2)
+    still = floating.copy()  # an instant beside a floating interval
+    still[:-1] |= floating[1:]
+    part = slice(first, None)
+    emf, rate = np.diff(swept[first - 1 :], axis=0) / (p * h), np.diff(angle[first - 1 :])[:, None] / h
+    moving = np.abs(rate) > STANDSTILL
+    mean, at_end = (float(np.sqrt(np.mean(s))) for s in scatter)
+    return Record(
+        V=signals.voltage[run, part],
+        i=project(i[part], ~floating[part]),
+        end=project(end[first - 1 :], ~still[first - 1 :]),
+        emf=emf,
+        f=np.where(moving, emf / np.where(moving, rate, 1.0), 0.0),
+        live=~floating[part],
+        live_end=~still[first - 1 :],
+        stretch=np.floor(p * angle[first - 1 : -1] / STRETCH).astype(np.int64),
+        noise=NoiseLevels(USUAL_VOLTAGE, mean, at_end, rate_noise),
+        interval=h,
+    )
+
+
+def regressors(r: Record, i: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(row, phase, 12) derivatives of the voltages by [R, k, L, c] of phases a, b, c."""
+    X = np.zeros((*r.V.shape, UNKNOWNS))
+    for j in range(3):
+        X[:, j, 3 * CURRENT + j], X[:, j, 3 * EMF + j] = i[:, j], r.emf[:, j]
+        X[:, j, 3 * DIDT + j], X[:, j, 3 * INTERCEPT + j] = np.diff(end[:, j]) / r.interval, r.live[:, j]
+    return X
+
+
+def residuals(r: Record, beta: np.ndarray) -> np.ndarray:
+    """(row, phase) recorded less predicted voltage (V); ``beta`` (4, phase) R, k, L, c."""
+    R, k, L, c = beta
+    return r.V - R * r.i - k * r.emf - L * np.diff(r.end, axis=0) / r.interval - c * r.live
+
+
+def information(r: Record, beta: np.ndarray, noise: NoiseLevels) -> np.ndarray:
+    """(12, 12) Fisher information of [R, k, L, c] where ``r`` holds true currents and speeds."""
+    C, G = _factor(r, beta, replace(noise, speed=0.0))
+    W = forward(C, G, regressors(r, r.i, r.end)).reshape(-1, UNKNOWNS)
+    return W.T @ W
+
+
+def _factor(r: Record, beta: np.ndarray, noise: NoiseLevels) -> tuple[np.ndarray, np.ndarray]:
+    R, k, L, _ = beta
+    levels = noise.voltage, noise.current, noise.current_end, noise.speed
+    return factor(R, L / r.interval, k * r.f, r.live, r.live_end, *levels)
+
+
+def nine_of(normal: np.ndarray) -> np.ndarray:
+    """(9, 9) covariance of [R, k, L] from the information of all twelve."""
+    scale = np.sqrt(np.diagonal(normal))
+    return (np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale))[:9, :9]
+
+
+def _voltage_noise(r: Record, beta: np.ndarray, noise: NoiseLevels) -> float:
+    """Voltage noise (V) that the residuals at ``beta`` leave once that of currents and speed is taken off."""
+    m = np.maximum(np.sum(r.live, axis=1, keepdims=True), 1)
+    m_end = np.maximum(np.sum(r.live_end, axis=1, keepdims=True), 1)
+    of_end = r.live_end * (1.0 - 1.0 / m_end)
+    known = (beta[CURRENT] * noise.current) ** 2 * r.live * (1.0 - 1.0 / m)
+    known = known + (beta[EMF] * r.f * noise.speed) ** 2
+    known = known + (beta[DIDT] / r.interval * noise.current_end) ** 2 * (of_end[1:] + of_end[:-1])
+    left = float(np.mean(residuals(r, beta) ** 2 - known))
+    return float(np.sqrt(max(left, LEAST_VOLTAGE**2)))
+
+
+def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | None) -> NineFit | None:
+    """Gauss-Newton on the joint equations; None where the rows leave an unknown undetermined."""
+    beta = np.zeros((4, 3))
+    beta[CURRENT], beta[EMF], beta[DIDT] = actuator.resistance, actuator.back_emf, actuator.inductance
+    # the noise of the smoothed speed is told by the record in any case
+    noise = r.noise if stated is None else replace(stated, speed=r.noise.speed)
+    i, end = r.i, r.end
+    for turn in range(1 + PASSES):
+        if turn and stated is None:
+            noise = replace(noise, voltage=_voltage_noise(r, beta, noise))
+        C, G = _factor(r, beta, noise)
+        left = residuals(r, beta)
+        white = forward(C, G, left[..., None])[..., 0]
+        if turn:
+            u = backward(C, G, white)
+            # records quieter than stated, noise-free ones above all, are corrected for the noise that they do have
+            quiet = min(1.0, float(np.mean(white**2)))
+            i = r.i + quiet * noise.current**2 * project(beta[CURRENT] * u, r.live)
+            moved = np.zeros(r.end.shape)
+            moved[1:] += beta[DIDT] / r.interval * u
+            moved[:-1] -= beta[DIDT] / r.interval * u
+            end = r.end + quiet * noise.current_end**2 * project(moved, r.live_end)
+        W = forward(C, G, regressors(r, i, end)).reshape(-1, UNKNOWNS)
+        normal = W.T @ W
+        if is_singular(normal):
+            return None
+        beta = beta + np.linalg.solve(normal, W.T @ white.ravel()).reshape(4, 3)
+    fit, freedom = _by_stretch(r.stretch, white)
+    covariance = nine_of(information(replace(r, i=i, end=end), beta, noise))
+    return NineFit(beta, covariance, np.mean(white**2, axis=0), fit, freedom)
+
+
+def _by_stretch(stretch: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(phase,) mean square of white residuals' standardised means over each stay in a stretch; its freedom."""
+    starts = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
+    lengths = np.diff(starts, append=len(stretch))
+    total = np.sum((np.add.reduceat(white, starts, axis=0) / np.sqrt(lengths)[:, None]) ** 2, axis=0)
+    freedom = max(len(starts) - UNKNOWNS // 3, 1)
+    return total / freedom, np.full(3, freedom)
+
+
+def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
+    """R_j, k_j, L_j and intercept of each phase with their joint covariance.
+
+    ``extras``: ``nine_covariance`` (run, 9, 9) of [R, k, L] (SI); ``chi2`` (run, phase) residual variance over the one
+    expected from the noise levels; ``fit`` (run, phase) mean square of the standardised mean residuals of 15 electrical
+    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise. Without end
+    currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, with L_j nominal
+    to 30 %, and ``fit`` is NaN.
+
+    Raises
+    ------
+    InputError : an unknown setting or an impossible value
+    """
+    s = read_settings(NineSettings, settings, "nine")
+    check_number("nine", "discard", s.discard, 0.0)
+    check_number("nine", "plateau_width", s.plateau_width, 30.0, 180.0)
+    check_number("nine", "zero_current", s.zero_current, 0.0)
+    runs = signals.runs
+    nine, chi2, fit = np.full((runs, 9, 9), np.nan), np.full((runs, 3), np.nan), np.full((runs, 3), np.nan)
+    freedom = np.zeros((runs, 3), np.int64)
+    told = {"chi2": chi2, "fit": fit, "freedom": freedom, "nine_covariance": nine}
+    if signals.current_end is None:
+        plain = WeightedSettings(s.discard, 2.0, s.plateau_width, True, s.zero_current, s.noise)
+        found, fits = fit_runs(signals, actuator, plain, lambda rows: rows.f[:, None])
+        for each in fits:
+            nine[each.run] = 0.0
+            nine[each.run, :6, :6] = found.covariance[each.run]
+            nine[each.run, 6:, 6:] = np.eye(3) * (LOOSE_INDUCTANCE * actuator.inductance) ** 2
+        chi2[:] = found.extras["chi2"]
+        nominal = np.where(np.isfinite(found.R), actuator.inductance, np.nan)
+        return Features(found.R, found.k, nominal, found.offset, found.covariance, told)
+    stated = None if s.noise is None else stated_noise(s.noise)
+    beta = np.full((4, runs, 3), np.nan)
+    for run in range(runs):
+        record = read_record(signals, run, actuator, s)
+        estimate = None if record is None else fit_record(record, actuator, stated)
+        if estimate is not None:
+            beta[:, run], nine[run], chi2[run] = estimate.beta, estimate.covariance, estimate.chi2
+            fit[run], freedom[run] = estimate.fit, estimate.freedom
+    R, k, L, offset = beta
+    return Features(R, k, L, offset, nine[:, :6, :6].copy(), told)
