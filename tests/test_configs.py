@@ -50,6 +50,7 @@ def test_every_option_of_a_group_composes(group, tmp_path):
         ("experiment=smoke", ("experiment", "chosen by itself")),
         ("search.space.network.width.low=0", ("search.space.network.width", "0", "from 1 to 256")),
         ("+search.space.network.depth=[1]", ("search.space.network.depth", "activation, coordinates, layers, width")),
+        ("unit.spread_of=[stribeck]", ("unit.spread_of", "stribeck", "unit_calibration")),
         ("reconstruction.paper.threshold=-1", ("reconstruction.paper.threshold", "-1", "from 0")),
         ("'", ("overrides", "quotation")),
         ("unlisted=3", ("unlisted", "3", "a list of entries")),
@@ -155,6 +156,8 @@ def test_magnet_and_load_become_effects_that_an_explicit_effect_overrules():
 
 def test_equal_datasets_are_shared_and_others_are_not():
     (tolerance,) = config.plan("unit_tolerance").cases
+    (nine,) = config.plan("nine_tolerance").cases
+    assert nine.datasets == {"training": "nine_tolerance", "fresh": "unit_tolerance", "reference": "unit_tolerance"}
     assert tolerance.datasets == {"training": "paper", "fresh": "unit_tolerance", "reference": "unit_tolerance"}
     (own,) = config.plan("paper", "name=mine training.epochs=10").cases
     assert own.path == "mine" and set(own.datasets.values()) == {"paper"}

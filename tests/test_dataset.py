@@ -121,11 +121,11 @@ def test_a_folder_that_cannot_be_written_is_refused_and_nothing_is_left(tmp_path
     assert [p.name for p in tmp_path.iterdir()] == ["blocked"]
 
 
-@pytest.mark.parametrize("method", ["weighted", "angle_resolved"])
+@pytest.mark.parametrize("method", ["weighted", "angle_resolved", "nine"])
 def test_features_written_block_by_block_are_those_of_all_runs_at_once(tmp_path, monkeypatch, method):
     monkeypatch.setattr(dataset, "BLOCK", 2)
     shards = _write(tmp_path, _spec(shards=2))
-    chosen = config.compose("rotor_angle_eccentricity", ["reconstruction=[weighted,angle_resolved]"])
+    chosen = config.compose("rotor_angle_eccentricity", ["reconstruction=[weighted,angle_resolved,nine]"])
     spec = config.reconstruction_spec(chosen, method)
     reconstruct_features([str(path) for path in shards], spec, tmp_path / "features.nc")
     settings = {key: value for key, value in spec["settings"].items() if key != "method"}
@@ -133,6 +133,8 @@ def test_features_written_block_by_block_are_those_of_all_runs_at_once(tmp_path,
     table = read_features(tmp_path / "features.nc")
     np.testing.assert_array_equal(table.features.six, whole.six)
     np.testing.assert_array_equal(table.features.covariance, whole.covariance)
+    np.testing.assert_array_equal(table.inputs, whole.inputs)
+    np.testing.assert_array_equal(table.features.inputs_covariance, whole.inputs_covariance)
     if method == "angle_resolved":
         np.testing.assert_array_equal(table.inputs[:, 6:], whole.extras["xi"])
 
