@@ -70,7 +70,7 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
-def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0, dispersion=1.0):
+def held(monkeypatch, misfit, whole, explored, named, described=(), another=-np.inf, change=-50.0, dispersion=1.0):
     """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
     units = {
         "load_spring": unit("load_spring", "torque"), "load": unit("load", "torque"),
@@ -93,6 +93,7 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), change=-50.0
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
     monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
+    monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect: another)
     return held_out.held_to_account(
         None, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
         SimpleNamespace(models=explored, search=search),
@@ -143,6 +144,13 @@ def test_a_name_that_has_another_size_in_each_recording_loses_its_odds(monkeypat
     assert changes == {"load_spring": 4.0} and kept[0].units == ("remainder:torque",)
     named = [m for m in kept if "load_spring" in m.units]
     assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(4.0)
+
+
+def test_a_name_that_has_any_form_loses_its_odds(monkeypatch):
+    misfit = {("load_spring",): 80.0, (): 100.0}
+    whole, explored = [model(0.0, "load_spring"), model(-50.0)], [model(0.0, "load_spring"), model(-2.0)]
+    kept, _, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"], another=4.0)
+    assert kept[0].units == ("remainder:torque",)
 
 
 def test_a_name_whose_score_is_overdispersed_is_told_by_less(monkeypatch):
@@ -220,3 +228,10 @@ def test_what_is_named_in_place_of_a_name_is_held_to_account_as_well(monkeypatch
     whole = [model(0.0, "load_spring"), model(-50.0)]
     _, ratios, _ = held(monkeypatch, misfit, whole, [model(0.0, "load_spring"), model(-2.0)], [])
     assert ratios == {"load_spring": -15.0}
+
+
+def test_what_may_be_the_controllers_alone_is_no_gap_of_the_machine():
+    units = [unit("late", "control"), unit("load", "torque")]
+    for other, verdict in (("late", "no_gap"), ("load", "unknown")):
+        weak = [model(0.0, other), model(-0.2)]  # 0.55 to 0.45
+        assert read(weak, units).verdict == verdict

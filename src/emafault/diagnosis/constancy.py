@@ -14,11 +14,12 @@ from scipy.special import logsumexp
 
 from .evidence import log_evidence
 from .fit import Bench, Fit
-from .linear import White, assemble
+from .linear import OWN_SHARES, OWN_SIZE, White, assemble
 from .model import WORDS
 from .search import FORM_PRIOR, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
 
-SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
+#: of a unit's own size, by which it may differ from recording to recording all the same: as far as its form may
+SCATTER = tuple(OWN_SIZE * share for share in OWN_SHARES)
 #: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes
 SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 SHARES = (10.0, 3.0, 1.0, 0.3)  # of a unit's size, of what goes along its columns without being of its form
@@ -55,11 +56,11 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     beside = {n: prior[n] for n in rest}
     sizes = {n: abs(model.deviations.get(n, 0.0) - bench.prior(n)[2]) for n in mine}
     one = {**beside, **{n: prior[n] for n in mine}}
-    nearly = one | {o: (0.0, max(SCATTER * sizes[n], 1e-12)) for n in mine for o in own[n]}
+    nearly = [one | {o: (0.0, max(s * sizes[n], 1e-12)) for n in mine for o in own[n]} for s in SCATTER]
     candidate = fit.search.candidates[unit, choice.variant % OTHER_FORM]
     widest = dict(zip(candidate.names, candidate.sd, strict=True))
     changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
-    constant = [evidence(one), evidence(nearly)]
+    constant = [evidence(one), *(evidence(n) for n in nearly)]
     return float(log_mean(changing) - log_mean(constant) + PRIOR)
 
 

@@ -15,6 +15,7 @@ from .point import is_parameter
 from .search import NEAR, OTHER_FORM, Model, Search
 
 ROUNDS = 3
+LINEAR = 0.01  # of what an effect explains, that a linear model may be wrong by
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
@@ -136,6 +137,7 @@ class Bench(NormalEquations):
             whites = self.linearise(renew=True, leading=found)
             renewed = self.normal(whites)
             search = self._search(renewed)
+            self._against_rivals(search, renewed)
             before, best, normal = best, search.ranked()[0], renewed
             if best.units == before.units:
                 break
@@ -387,6 +389,39 @@ class Bench(NormalEquations):
                 top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
         self.point, self.on = better[0] if better[1] else begun
         return better[1]
+
+    def _against_rivals(self, search: Search, normal: Normal) -> None:
+        """Compare the leading set with those that have another listed effect in the place of one that it nearly stands
+        for, each at its own optimum, and correct the sets of the search by what that changes.
+
+        What a large effect explains is wrong in the linear model by more than what tells a near rival from it.
+        """
+        best = search.ranked()[0]
+        rivals = []
+        for unit in (u for u in best.units if self._kind(u) in LISTED):
+            rest = tuple((c.unit, c.variant) for c in best.choices if c.unit != unit)
+            reach = LINEAR * (best.log_posterior - search.fit(rest).log_posterior)
+            for m in search.candidates:
+                if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM and m[0] not in best.units:
+                    found = search.fit((*rest, m))
+                    if NEAR < reach and best.log_posterior - found.log_posterior < reach:
+                        rivals.append((unit, m[0], found))
+        if not rivals:
+            return
+        begun = dict(self.point), set(self.on)
+
+        def at_its_own(model: Model) -> float:
+            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.move(model, normal)
+            return self.settle(Model(model.choices, 0.0, 0.0, {}, {})).log_posterior
+
+        leading = at_its_own(best)
+        for unit, rival, model in rivals:
+            error = at_its_own(model) - leading - (model.log_posterior - best.log_posterior)
+            for other in search.seen.values():
+                if rival in other.units and unit not in other.units:
+                    other.log_posterior += error
+        self.point, self.on = begun
 
     def _listed_instead(self, search: Search, best: Model) -> list[Model]:
         """A set with each of the likeliest listed effects in the place of each of its described forms.

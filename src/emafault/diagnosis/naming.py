@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from scipy.special import expit
 
-from .model import LISTED, Unit
+from .model import LISTED, SETTINGS, Unit
 from .search import Model, posterior
 
 NAMED = 0.9
@@ -55,7 +55,7 @@ def read(
     inclusion: dict[str, float] = {e: 1.0 for e in observed}
     masses: dict[tuple[str, ...], float] = {}
     leading: dict[tuple[str, ...], Model] = {}
-    empty = unknown = 0.0
+    empty = unknown = settings = 0.0
     acts = {u.id: u.equations for u in units}
     wanders = {e: float(expit(odds)) for e, odds in wandering.items()}
     for model, w in zip(models, weights, strict=True):
@@ -72,6 +72,7 @@ def read(
         if listed:
             masses[listed] = masses.get(listed, 0.0) + float(w)
             leading.setdefault(listed, model)
+            settings += float(w) * all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed)
         elif any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units):
             unknown += float(w)
         else:
@@ -84,7 +85,7 @@ def read(
     forms = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e) == "form"))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
-    nothing = max(0.0, empty)
+    nothing = max(0.0, empty + settings)  # what is the controller's alone is no gap of the machine
     beside = counted or forms or [r for r in remainders if r not in OWN_BUSINESS]
     if named and not groups:
         verdict = "partly" if beside else "explained"

@@ -7,13 +7,11 @@ import numpy as np
 
 from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
-from .linear import OWN_FORM, White, assemble, full_model, white_rows
+from .linear import OWN_FORM, OWN_SHARES, White, assemble, full_model, white_rows
 from .linearisation import Carried, Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .point import Point, is_parameter
 from .search import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
-
-OWN_SHARES = (1.0, 0.2)  # of the largest own form: as far from the library's as a form is, or near it
 
 
 class NormalEquations(Point):
