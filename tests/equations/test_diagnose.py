@@ -91,7 +91,7 @@ def test_a_pickup_is_described_and_the_effect_beside_it_is_named():
     verdict = verdict_of(hummed)
     assert verdict["which"][0]["effects"] == ["cogging"] and verdict["verdict"] == "partly"
     (found,) = verdict["discovered"]
-    assert (found["form"], found["equation"]) == ("frequency", "electrical_a")
+    assert (found["form"], found["equation"]) == ("frequency", "sensor_voltage")
     assert found["parameters"]["frequency"]["value"] == pytest.approx(77.0, abs=0.2)
     assert found["parameters"]["amplitude"]["value"] == pytest.approx(0.1, rel=0.1)
     assert found["probability"] > 0.9 and found["closed"] is not None and "77" in found["sentence"]

@@ -44,9 +44,9 @@ class Described:
 
     def same(self, other: "Described") -> bool:
         """Whether it is another where this one is, its shape no further than scans of both may be off."""
-        if (self.word, self.equation, self.driver, self.channel) != (
-            other.word, other.equation, other.driver, other.channel,
-        ):  # fmt: skip
+        if (self.word, self.equation, self.channel) != (other.word, other.equation, other.channel):
+            return False
+        if not self.channel and self.driver != other.driver:  # which has shown a channel's form is all the same
             return False
         pairs = zip(self.shape, other.shape, strict=True)
         return all(abs(a[1] - b[1]) <= SAME * np.hypot(a[2], b[2]) + 1e-9 * abs(a[1]) for a, b in pairs)
@@ -177,7 +177,11 @@ def scanned(
 def proposed(machine, found: Sequence[Proposal]) -> list[Described]:
     """The most probable of what scans have found, each in the channels and coefficients that it may lie in as well."""
     out = [d for _, d in sorted(found, key=lambda x: (-x[0], x[1].id))][:PROPOSED]
-    return [*out, *(c for d in out[:CHANNELED] for c in _elsewhere(machine, d))]
+    elsewhere: list[Described] = []
+    for form in (c for d in out[:CHANNELED] for c in _elsewhere(machine, d)):
+        if not any(form.same(other) for other in elsewhere):  # several equations may show it
+            elsewhere.append(form)
+    return [*out, *elsewhere]
 
 
 def _elsewhere(machine, form: Described) -> list[Described]:
