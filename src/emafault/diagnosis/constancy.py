@@ -6,7 +6,7 @@ drawn anew for each, with zero mean instead of a common one (Higgins, Thompson a
 Royal Statistical Society A 172, 137).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,12 +14,11 @@ from scipy.special import logsumexp
 
 from .evidence import log_evidence
 from .fit import Bench, Fit
-from .linear import OWN_SHARES, OWN_SIZE, White, assemble
+from .linear import White, assemble
 from .model import WORDS
 from .search import FORM_PRIOR, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
 
-#: of a unit's own size, by which it may differ from recording to recording all the same: as far as its form may
-SCATTER = tuple(OWN_SIZE * share for share in OWN_SHARES)
+SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
 #: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes
 SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 SHARES = (10.0, 3.0, 1.0, 0.3)  # of a unit's size, of what goes along its columns without being of its form
@@ -44,7 +43,8 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     own = {n: [_of(unit, n, r) for r in bench.recordings] for n in mine}
     prior = prior_of(fit, model)
     rest = [n for n in prior if n not in mine and not n.startswith(f"own.{unit}.")]
-    names = [*bench.nuisances, *rest, *mine, *(o for each in own.values() for o in each)]
+    form = [n for n in prior if n.startswith(f"own.{unit}.")]
+    names = [*bench.nuisances, *rest, *mine, *form, *(o for each in own.values() for o in each)]
     whites = [_split(w, unit, source) for w in fit.whites]
     reduced = bench.reduce(assemble(whites, names, {n: q for n, q in aliases.items() if n in names}))
 
@@ -55,12 +55,16 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
 
     beside = {n: prior[n] for n in rest}
     sizes = {n: abs(model.deviations.get(n, 0.0) - bench.prior(n)[2]) for n in mine}
-    one = {**beside, **{n: prior[n] for n in mine}}
-    nearly = [one | {o: (0.0, max(s * sizes[n], 1e-12)) for n in mine for o in own[n]} for s in SCATTER]
+    one = {**beside, **{n: prior[n] for n in (*mine, *form)}}
+    scatter = {n: {o: (0.0, max(SCATTER * sizes[n], 1e-12)) for o in own[n]} for n in mine}
     candidate = fit.search.candidates[unit, choice.variant % OTHER_FORM]
     widest = dict(zip(candidate.names, candidate.sd, strict=True))
-    changing = [evidence(beside | {o: (0.0, w * widest[n]) for n in mine for o in own[n]}) for w in SIZES]
-    constant = [evidence(one), *(evidence(n) for n in nearly)]
+    free = [{n: {o: (0.0, w * widest[n]) for o in own[n]} for n in mine} for w in SIZES]
+    changing = [evidence(beside | _all(each)) for each in free]
+    constant = [evidence(one), evidence(one | _all(scatter))]
+    if len(mine) > 1:  # what it is mostly seen by is the same; how it looks there may be another matter
+        main = max(mine, key=lambda n: sizes[n] / model.spread.get(n, np.inf))
+        constant += [evidence(one | _all({**each, main: scatter[main]})) for each in free]
     return float(log_mean(changing) - log_mean(constant) + PRIOR)
 
 
@@ -97,6 +101,10 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     kinds = {tuple(f.extra.tolist()) for f in forms}
     any_of = [evidence(rest | {names[k]: (0.0, s) for k in kind}) for kind in kinds for s in SHARES]
     return float(log_mean(any_of) - of + PRIOR)
+
+
+def _all(by_column: Mapping[str, Mapping[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
+    return {o: q for each in by_column.values() for o, q in each.items()}
 
 
 def log_mean(logs: Sequence[float]) -> float:

@@ -10,9 +10,8 @@ from .model import Block
 from .whitening import OUTLIER, Weights, coloured, filtered, products, whiten
 
 OWN = slice(0, 14)  # functions of an own form; the first is constant, for it may differ between equations
-OWN_SIZE = 0.3  # of an effect's size, by which it is in another form than the library's
+OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 OWN_SHARES = (1.0, 0.2)  # of that: as far from the library's as a form is, or near it
-OWN_FORM = OWN_SIZE / np.sqrt(3.0)  # each of these functions
 SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 FEW = 30  # rows
