@@ -13,7 +13,8 @@ def _metrics(path, closed_form, network, bound):
         {"method": "weighted", "estimator": estimator, "all": {f"errors.{o}.mae": {"mean": error} for o in outputs}}
         for estimator, error in (("closed_form", closed_form), ("network", network))
     ]
-    path.write_text(json.dumps({"results": results, "level": 0.9, "bound": {"floating": dict.fromkeys(outputs, bound)}}))
+    bounds = {"floating": dict.fromkeys(outputs, bound)}
+    path.write_text(json.dumps({"results": results, "level": 0.9, "bound": bounds}))
     return str(path)
 
 
