@@ -1,5 +1,6 @@
 """Measured machines by name, or as a file that states one, and the cases that recordings hold."""
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import util
@@ -57,10 +58,13 @@ def stated(name: str) -> Stated:
     spec = util.spec_from_file_location(f"emafault_machine_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = util.module_from_spec(spec)
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is left beside a user's file
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as problem:  # whatever a user's file does wrong
         raise InputError(f"{path}: {type(problem).__name__}: {' '.join(str(problem).split())}; {ACCEPTED}") from None
+    finally:
+        sys.dont_write_bytecode = before
     for needed in NEEDED:
         if not callable(getattr(module, needed, None)):
             raise InputError(f"{path}: has no function '{needed}'; {ACCEPTED}")
