@@ -233,11 +233,8 @@ def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _quality(quality: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[list[str], list[str], list[list[dict]]]:
     """Rows, columns and cells of the picture of the recordings' quality, the worst recordings of many."""
-    most = {
-        channel: float(np.median([q[channel]["noise"] for q in quality.values() if channel in q]))
-        for channel in CHANNELS
-    }
     channels = [c for c in CHANNELS if any(c in q for q in quality.values())]
+    most = {c: float(np.median([q[c]["noise"] for q in quality.values() if c in q])) for c in channels}
     rows = {name: [_cell(q.get(c), c, most[c]) for c in channels] for name, q in quality.items()}
     worst = sorted(rows, key=lambda n: (-sum(c["fault"] for c in rows[n]), -max(c["relative"] for c in rows[n])))
     shown = [n for n in rows if n in set(worst[:ROWS])]
