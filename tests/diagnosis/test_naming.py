@@ -235,3 +235,5 @@ def test_what_may_be_the_controllers_alone_is_no_gap_of_the_machine():
     for other, verdict in (("late", "no_gap"), ("load", "unknown")):
         weak = [model(0.0, other), model(-0.2)]  # 0.55 to 0.45
         assert read(weak, units).verdict == verdict
+    left = [model(0.0, "late", "remainder:bus"), model(-0.2, "remainder:bus")]
+    assert read(left, [*units, unit("remainder:bus", "bus", kind="remainder")]).verdict == "unknown"

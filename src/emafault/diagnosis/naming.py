@@ -69,11 +69,13 @@ def read(
             if left not in model.units and not any(_meet(acts.get(u, ()), (e,)) for u in listed):
                 inclusion[left] = inclusion.get(left, 0.0) + float(w) * p
                 steady *= 1.0 - p
+        left_over = any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units)
         if listed:
             masses[listed] = masses.get(listed, 0.0) + float(w)
             leading.setdefault(listed, model)
-            settings += float(w) * all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed)
-        elif any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units):
+            if not left_over and all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed):
+                settings += float(w) * steady
+        elif left_over:
             unknown += float(w)
         else:
             empty += float(w) * steady
