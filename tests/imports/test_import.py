@@ -54,6 +54,8 @@ def test_any_format_through_the_command(file, tmp_path, fine, truth, capsys):
     assert off(recording, truth) == []
     assert read_bench(tmp_path / "bench", ACTUATOR).recordings.keys() == {"one.nc"}
     assert json.loads(recording.attributes["import_map"])["unit"] == "unit 7" == recording.attributes["unit"]
+    assert main(["import", "--map", str(tmp_path / "map.yaml"), "--out", str(tmp_path / "bench")]) == 2
+    assert "one.nc: exists already, --force replaces it" in capsys.readouterr().err
     assert recording.attributes["source"] == file and recording.known["phase_voltage"] == {"reference": "modelled_star"}
     page = (tmp_path / "bench" / "import.html").read_text()
     assert "pole pairs" in page and "What these recordings cannot tell" in page

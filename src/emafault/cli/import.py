@@ -18,6 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--guess", metavar="MAP", help="write a map guessed from the channels' names and units")
     what.add_argument("--map", metavar="MAP", help="import by this map")
     parser.add_argument("--out", metavar="DIR", help="folder to write recordings and import.html to")
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -33,7 +34,7 @@ def run(args: argparse.Namespace) -> None:
     if args.map:
         if not args.out:
             raise InputError("--map: needs --out DIR, a folder to write to")
-        _import(args.map, args.out, args.overrides)
+        _import(args.map, args.out, args.overrides, args.force)
         return
     if not files:
         raise InputError("no file is named; name at least one")
@@ -45,20 +46,21 @@ def run(args: argparse.Namespace) -> None:
         return
     from ..imports.guess import guess
     from ..io.atomic import write_text
+    from ..places import refuse_output
 
-    if Path(args.guess).exists():
-        raise InputError(f"{args.guess}: exists; name a new map")
+    refuse_output(args.guess, "--guess", read=files, force=args.force)
     write_text(args.guess, guess(files, Path(args.guess).parent))
     print(f"{args.guess}: fill in every ???, then emafault import --map {args.guess} --out bench/")
 
 
-def _import(path: str, out: str, overrides: list[str]) -> None:
+def _import(path: str, out: str, overrides: list[str], force: bool) -> None:
     from .. import config
     from ..actuator.parameters import ActuatorParameters
     from ..imports.run import import_bench
 
+    config.refuse_unread(overrides, config.DIAGNOSED, "import")
     spec = config.diagnosis_spec(config.compose(overrides=overrides))
-    result = import_bench(path, out, ActuatorParameters(**spec["actuator"]), spec["sensors"]["voltage"])
+    result = import_bench(path, out, ActuatorParameters(**spec["actuator"]), spec["sensors"]["voltage"], force)
     for finding in result.findings:
         print(finding.text())
     for name, lost in result.lost.items():

@@ -8,11 +8,12 @@ Royal Statistical Society A 172, 137).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
 
-from .evidence import log_evidence
+from .evidence import Reduced, log_evidence
 from .fit import Bench, Fit
 from .linear import White, assemble
 from .model import WORDS
@@ -48,11 +49,7 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     whites = [_split(w, unit, source) for w in fit.whites]
     reduced = bench.reduce(assemble(whites, names, {n: q for n, q in aliases.items() if n in names}))
 
-    def evidence(free: dict[str, tuple[float, float]]) -> float:
-        index = np.array([reduced.index[n] for n in free], int)
-        mean, sd = np.array([*free.values()]).T
-        return log_evidence(reduced, index, mean, sd)[0]
-
+    evidence = partial(_evidence, reduced)
     beside = {n: prior[n] for n in rest}
     sizes = {n: abs(model.deviations.get(n, 0.0) - bench.prior(n)[2]) for n in mine}
     one = {**beside, **{n: prior[n] for n in (*mine, *form)}}
@@ -87,20 +84,22 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     prior = prior_of(fit, model)
     rest = {n: q for n, q in prior.items() if n not in plain.names and not n.startswith(f"own.{unit}.")}
     names: Sequence[str] = fit.search.reduced.names
-
-    def evidence(free: dict[str, tuple[float, float]]) -> float:
-        index = np.array([fit.search.reduced.index[n] for n in free], int)
-        mean, sd = np.array([*free.values()]).reshape(-1, 2).T
-        return log_evidence(fit.search.reduced, index, mean, sd)[0]
-
+    evidence = partial(_evidence, fit.search.reduced)
     whole = rest | {n: prior[n] for n in plain.names}
     near = [
         evidence(whole | {names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)}) for f in forms
     ]
     of = logsumexp([evidence(whole) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)])
-    kinds = {tuple(f.extra.tolist()) for f in forms}
+    kinds = dict.fromkeys(tuple(f.extra.tolist()) for f in forms)
     any_of = [evidence(rest | {names[k]: (0.0, s) for k in kind}) for kind in kinds for s in SHARES]
     return float(log_mean(any_of) - of + PRIOR)
+
+
+def _evidence(reduced: Reduced, free: Mapping[str, tuple[float, float]]) -> float:
+    """Log evidence with these columns free: mean and standard deviation of each."""
+    index = np.array([reduced.index[n] for n in free], int)
+    mean, sd = np.array([*free.values()]).reshape(-1, 2).T
+    return log_evidence(reduced, index, mean, sd)[0]
 
 
 def _all(by_column: Mapping[str, Mapping[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:

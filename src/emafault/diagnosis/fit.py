@@ -401,10 +401,12 @@ class Bench(NormalEquations):
         for unit in (u for u in best.units if self._kind(u) in LISTED):
             rest = tuple((c.unit, c.variant) for c in best.choices if c.unit != unit)
             reach = LINEAR * (best.log_posterior - search.fit(rest).log_posterior)
+            if reach <= NEAR:  # what tells them apart is larger than the linear model's error
+                continue
             for m in search.candidates:
                 if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM and m[0] not in best.units:
                     found = search.fit((*rest, m))
-                    if NEAR < reach and best.log_posterior - found.log_posterior < reach:
+                    if best.log_posterior - found.log_posterior < reach:
                         rivals.append((unit, m[0], found))
         if not rivals:
             return

@@ -33,11 +33,12 @@ EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: co
 ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
-#: channels whose faults show in an equation
+#: channels whose faults show in an equation, as what one of its drivers multiplies: a wave of the recorded angle is
+#: also one of its rate, times the speed
 CHANNELS = {
-    "sensor_speed": ("angle",), "torque": ("angle",), "position": ("angle", "output"),
-    "sensor_current": ("current_a", "current_b", "current_c"), "electrical_a": ("current_a",),
-    "electrical_b": ("current_b",), "electrical_c": ("current_c",),
+    ("sensor_speed", 0): ("angle",), ("sensor_speed", 1): ("angle",), ("torque", 0): ("angle",),
+    ("position", 0): ("angle", "output"), ("sensor_current", 0): ("current_a", "current_b", "current_c"),
+    ("electrical_a", 0): ("current_a",), ("electrical_b", 0): ("current_b",), ("electrical_c", 0): ("current_c",),
 }  # fmt: skip
 #: equations by name, beside those of the phases
 OF_STATE = {
@@ -235,9 +236,8 @@ class ReferenceActuator:
 
     # ---- the measuring chain
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
-        """Channels in which a form of a driver of an equation may lie, rather than in the equation itself: a wave of
-        the recorded angle is also one of its rate, times the speed."""
-        return CHANNELS.get(equation, ()) if driver == 0 or (equation, driver) == ("sensor_speed", 1) else ()
+        """Channels in which a form of a driver of an equation may lie, rather than in the equation itself."""
+        return CHANNELS.get((equation, driver), ())
 
     def coefficients(self, equation: str, driver: int) -> tuple[str, ...]:
         """Coefficients of other equations as well that a driver of an equation has."""
@@ -268,8 +268,8 @@ class ReferenceActuator:
         return {e: np.array(rows) for e, rows in found.items() if (place, e) not in self.moving}
 
     def seen_at(self, values: Mapping[str, float], name: str, x: np.ndarray) -> np.ndarray:
-        """(column, row) the same of signals on the angle's channel in the commutations, which depends on the point: on
-        where within an interval an edge lies."""
+        """(column, row) what signals x (column, sample) on the angle's channel take out of the commutations' residuals;
+        it depends on the point, on where within an interval an edge lies."""
         edges = [f"controller.edge_{j}@{name}" for j in PER_PHASE]
         state = State(self.recordings[name], Point(values, name, edges))
         slopes = commutation.residual(state).slopes

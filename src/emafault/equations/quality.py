@@ -11,14 +11,13 @@ from ..io.recording import Recording
 from ..io.sensors import cut_off, spikes
 from .signals import lattice_step
 
+#: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {
-    "phase_current": ("sensor_current", "current", "A"),
-    "phase_voltage": ("sensor_voltage", "voltage", "V"),
-    "bus_voltage": ("bus", "bus voltage", "V"),
-    "output_position": ("position", "output position", "rad"),
+    "phase_current": ("sensor_current", "current", "A", "current"),
+    "phase_voltage": ("sensor_voltage", "voltage", "V", "voltage"),
+    "bus_voltage": ("bus", "bus voltage", "V", "bus_voltage"),
+    "output_position": ("position", "output position", "rad", "output"),
 }
-#: words for a channel -> its place in a configuration
-PLACES = {"current": "current", "voltage": "voltage", "bus voltage": "bus_voltage", "output position": "output"}
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
 HELD = 3  # samples equal to the one before, which a channel with noise never shows
@@ -78,7 +77,7 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
     quality : what is ``seen``, by recording
     """
     out = []
-    for channel, (equation, words, units) in CHANNELS.items():
+    for channel, (equation, words, units, place) in CHANNELS.items():
         mine = {name: channels[channel] for name, channels in quality.items() if channel in channels}
         for form, found, parameter, unit, text in (
             ("clipping", {n: c.level for n, c in mine.items() if c.clipped}, "level", units,
@@ -93,7 +92,10 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
             found = {n: x for n, x in found.items() if x}
             if found:
                 value = float(np.median(list(found.values())))
-                out.append(_entry(form, equation, words, parameter, value, unit, text, list(found)))
+                entry = _entry(form, equation, words, parameter, value, unit, text, list(found))
+                # how large spikes are is not told
+                term = None if form == "spikes" else {"place": place, "form": form, parameter: float(f"{value:.8g}")}
+                out.append(entry | {"term": term})
     return out
 
 
@@ -123,12 +125,10 @@ def _repeated(x: np.ndarray) -> float:
 def _entry(
     form: str, equation: str, words: str, parameter: str, value: float, units: str, text: str, names: Sequence[str]
 ) -> dict[str, Any]:
-    # how large spikes are is not told
-    term = None if form == "spikes" else {"place": PLACES[words], "form": form, parameter: float(f"{value:.8g}")}
     sentence = "In the measuring chain " + text.format(words, value, units, 100.0 * value) + "."
     return {
         "unit": f"~{form}", "equation": equation, "along": "time", "form": form, "probability": CERTAIN, "closed": None,
         "another_form_of": None,
         "parameters": {parameter: {"value": value, "low": value, "high": value, "units": units}},
-        "recordings": list(names), "sentence": sentence, "term": term,
+        "recordings": list(names), "sentence": sentence,
     }  # fmt: skip

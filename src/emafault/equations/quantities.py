@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from ..actuator.shape import trapezoid_at, trapezoid_swept
 from .acquisition import true_currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
-from .shape import trapezoid_at, trapezoid_swept
 from .signals import passing_time
 from .terms import with_hook
 

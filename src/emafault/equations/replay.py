@@ -5,7 +5,6 @@ generalised features, and means over 10 ms; what two runs of the corrected simul
 another start of the switching, is the least that can be reached.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from ..faults import FAULT_NAMES
 from ..io.atomic import write_text
 from ..io.bench import new_folder, read_bench
 from ..io.recording import Recording, write_recording
+from ..plain import read_json
 from ..progress import progress
 from ..reconstruction import reconstruct
 from ..reporting.written import VERDICT, to_json
@@ -125,7 +125,7 @@ def table(compared: Mapping[str, Compared], without: str) -> str:
 
 def _verdict(path: Path, recordings: Mapping[str, Recording]) -> dict[str, Any] | None:
     """The verdict of a file if it is one on these recordings."""
-    verdict = json.loads(path.read_text()) if path.is_file() else {}
+    verdict = read_json(path) if path.is_file() else {}
     return verdict if "simulator" in verdict and set(verdict["fault_vector"]) & set(recordings) else None
 
 

@@ -20,7 +20,7 @@ from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
 from ..plain import array
 
-GAUSSIAN_ROWS = 20_000  # quantiles that stand for a Gaussian
+GAUSSIAN_ROWS = 2_000  # quantiles that stand for a Gaussian
 
 
 @dataclass(frozen=True)

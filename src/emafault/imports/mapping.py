@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ..errors import InputError
+from ..plain import read_yaml
 
 SCHEMA = Path(__file__).with_name("map.schema.json")
 BLANK = "???"  # what a guessed map leaves for its owner to say
@@ -21,12 +20,7 @@ def read_map(path: str | Path) -> dict[str, Any]:
     ------
     InputError : a file that cannot be read, a blank that is not filled in, or a key or value that the schema refuses
     """
-    path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: cannot be read as a map ({' '.join(str(error).split())})") from error
-    return complete(content, path)
+    return complete(read_yaml(path), Path(path))
 
 
 def complete(content: Any, path: Path) -> dict[str, Any]:

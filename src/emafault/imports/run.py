@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..io.bench import check_bench
 from ..io.recording import Recording, write_recording
 from ..io.sensors import refuse_mistaken
+from ..places import refuse_folder, refuse_output
 from . import phases, probes
 from .assemble import recording_of
 from .clocks import clocks
@@ -26,6 +27,7 @@ from .voltages import floating_legs, star_part, swept, terminals_from_duty, with
 from .windows import windows_of
 from .zero import Electrical, fit
 
+PAGE = "import.html"
 PASSES = 5  # of which each takes two thirds of what k is off
 
 
@@ -135,16 +137,26 @@ def _set_zero(raw: Raw, given: Mapping[str, Any], fitted: Electrical, pole_pairs
     return Finding(f"{raw.name}: electrical zero", words, fitted.margin, "no back-EMF that turns with the rotor")
 
 
-def import_bench(path: str | Path, out: str | Path, actuator: ActuatorParameters, voltage_noise: float) -> Imported:
+def import_bench(
+    path: str | Path, out: str | Path, actuator: ActuatorParameters, voltage_noise: float, force: bool = False
+) -> Imported:
     """Import by a map; write recordings and ``import.html``.
+
+    Parameters
+    ----------
+    force : whether files of these names are replaced
 
     Raises
     ------
-    InputError : see ``imported``; results that cannot be written
+    InputError : see ``imported``; results that cannot be written, or may not
     """
     from .page import draw
 
     given = read_map(path)
+    refuse_folder(out, "--out")
+    read = [path, *(file for entry in given["recordings"] for file in entry["files"].values())]
+    for name in (*(f"{entry['name']}.nc" for entry in given["recordings"]), PAGE):
+        refuse_output(Path(out) / name, "--out", read=read, force=force)
     result = imported(given, actuator, voltage_noise)
     folder = Path(out)
     plain = given | {  # without the folders of this machine
@@ -162,5 +174,5 @@ def import_bench(path: str | Path, out: str | Path, actuator: ActuatorParameters
         recording = result.recordings[name]
         attributes = recording.attributes | source | {"import_map": json.dumps(plain, sort_keys=True)}
         write_recording(folder / name, replace(recording, attributes=attributes))
-    draw(result, plain).write(folder / "import.html")
+    draw(result, plain).write(folder / PAGE)
     return result

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
-from ..equations.shape import trapezoid_swept
+from ..actuator.shape import trapezoid_swept
 from ..errors import InputError
 from .loading import Raw
 from .signal import Signal

@@ -68,13 +68,10 @@ def cramer_rao_bound(
     ------
     InputError : signals without end currents, or an impossible setting
     """
-    data = read_signals(signals, interval)
-    if data.current_end is None:
-        raise InputError("phase_current_end: missing among the signals, the bound needs it")
+    data, levels = _noise_free(signals, interval, noise)
+    assert data.current_end is not None
     s = read_settings(WeightedSettings, {**settings, "noise": noise}, "bound")
     check_settings(s, "bound")
-    check_number("bound", "noise.voltage", float(noise["voltage"]), 1e-9)
-    levels = stated_noise(noise)
     choice = sample_choice(s, interval, actuator)
     truth = reconstruct_weighted(data, actuator, settings={**settings, "noise": noise})
     covariance = np.full((data.runs, 6, 6), np.nan)
@@ -84,6 +81,22 @@ def cramer_rao_bound(
         covariance[run] = feature_covariance(data, rows, beta, levels)
     derivative = jacobian(lambda x: inverse(x[..., :3], x[..., 3:], actuator, alpha_m), truth.six)
     return Bound(covariance, propagate(covariance, derivative))
+
+
+def _noise_free(
+    signals: Mapping[str, np.ndarray], interval: float, noise: Mapping[str, float]
+) -> tuple[Signals, NoiseLevels]:
+    """Signals with end currents, and the levels of the noise that a bound is told of.
+
+    Raises
+    ------
+    InputError : signals without end currents, or an impossible level
+    """
+    data = read_signals(signals, interval)
+    if data.current_end is None:
+        raise InputError("phase_current_end: missing among the signals, the bound needs it")
+    check_number("bound", "noise.voltage", float(noise["voltage"]), 1e-9)
+    return data, stated_noise(noise)
 
 
 def feature_covariance(data: Signals, rows: list[Rows], beta: np.ndarray, noise: NoiseLevels) -> np.ndarray:
@@ -146,12 +159,8 @@ def nine_bound(
     ------
     InputError : signals without end currents, or an impossible setting
     """
-    data = read_signals(signals, interval)
-    if data.current_end is None:
-        raise InputError("phase_current_end: missing among the signals, the bound needs it")
+    data, levels = _noise_free(signals, interval, noise)
     s = read_settings(NineSettings, settings, "bound")
-    check_number("bound", "noise.voltage", float(noise["voltage"]), 1e-9)
-    levels = stated_noise(noise)
     truth = reconstruct_nine(data, actuator, {**settings, "noise": noise})
     covariance = np.full((data.runs, 9, 9), np.nan)
     for run in np.flatnonzero(truth.identified).tolist():

@@ -27,9 +27,9 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from ..actuator.parameters import ActuatorParameters
+from ..actuator.shape import trapezoid_swept
 from ..closed_form import PHASE_AXIS
 from ..compiled import compiled
-from ..equations.shape import trapezoid_swept
 from .features import Features, Signals, check_number, read_settings
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
 from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise

@@ -38,7 +38,7 @@ def stability(
 ) -> Stability:
     """Diagnose a case in ``repetitions`` draws of the noise, and once more in other recordings of the unit.
 
-    Effects that have no gap of the machine, the controller's own, are left out of what is compared.
+    What is described in the control equation, the controller's own business, is left out of the comparison.
     """
     case = draw_case(rung, seed)
     found = [_verdict(in_other_noise(case, n), actuator, noise) for n in range(repetitions)]

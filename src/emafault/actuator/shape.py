@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..actuator.motor import TWO_PI
 from ..compiled import compiled
+from .motor import TWO_PI
 
 
 @compiled
