@@ -52,7 +52,8 @@ def held_to_account(
     What has another size in each recording is held to account likewise: see ``constancy``.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
-    it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong.
+    it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong, by
+    itself and in the place of a form that is not told.
 
     Returns
     -------
@@ -89,6 +90,7 @@ def held_to_account(
         models += _dispersed(every, whole, models, leading, form, (form,))
         if ratios[form] < CLEAR:
             left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
+            left = left and account.instead(form) >= CLEAR
             moved = _moved(whole, models, form, left, _log_mass(models, (form,)))
             models[:] = [*(m for m in models if form not in m.units), *moved]
     return sorted(models, key=lambda m: -m.log_posterior), ratios, changes
@@ -143,6 +145,15 @@ class _Account:
         """Of the likeliest set with a remainder over the same without it; 0 where the explored recordings had none."""
         first = next((m for m in self.fit.models if unit in m.units), None)
         return 0.0 if first is None else self._over_less(first, unit)
+
+    def instead(self, unit: str) -> float:
+        """Of the likeliest set with a unit, a remainder in that one's place, over the same with nothing there; 0 where
+        the explored recordings never had the unit."""
+        first = next((m for m in self.fit.models if unit in m.units), None)
+        if first is None:
+            return 0.0
+        nothing, remainder = (self._misfit(_less(self.fit, first, unit, left)) for left in (False, True))
+        return 0.5 * (nothing - remainder)
 
     def _over_less(self, inside: Model, unit: str) -> float:
         return 0.5 * (self._misfit(self.fit.search.less(inside, unit)) - self._misfit(inside))

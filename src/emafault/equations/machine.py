@@ -21,6 +21,7 @@ SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings hav
 EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
+CURVATURE = 10.0  # times a smooth current's, by which a current at an interval's end is off its neighbours' mean
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
@@ -125,6 +126,8 @@ class ReferenceActuator:
                 for j in PER_PHASE:
                     full = f"rounded.{j}@{name}"
                     out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
+            for j in PER_PHASE if rec.current_end is None else ():
+                out[f"ends.{j}@{name}"] = Parameter(f"ends.{j}@{name}", 0.0, 0.0, CURVATURE, "1")
             for j in PER_PHASE:
                 full = f"controller.edge_{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
