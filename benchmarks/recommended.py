@@ -44,27 +44,20 @@ def main() -> None:
         chance = sequence(case, at_random(np.random.default_rng(case.seed)), actuator, noise)
         needed.append((found, chance))
         steps += found.steps
-        print(
-            f"{case.rung} {case.seed} ({', '.join(case.effects) or '-'}): {_told(found)} recommended, {_told(chance)} at random"
-        )
+        print(f"{case.rung} {case.seed} ({', '.join(case.effects) or '-'}):", end=" ")
+        print(f"{_told(found)} recommended, {_told(chance)} at random")
         for s in found.steps:
-            print(
-                f"    {s.leading} or {s.rival}: promised {s.promised:.1f}, from {s.before:.1f} to {s.after:.1f} {s.right}",
-                flush=True,
-            )
+            truth = {1: "the first", -1: "the second", 0: "neither"}[s.acts]
+            change = f"promised {s.promised:.1f}, from {s.before:.1f} to {s.after:.1f}"
+            print(f"    {s.leading} or {s.rival}: {change}, {truth} acts", flush=True)
     promises = [s for s in steps if s.promised >= DECIDED]
     print(f"{looked} cases, {len(needed)} with more than one reading left")
     print(f"promises kept: {sum(s.kept for s in promises)} of {len(promises)}")
     for low, high in ((0.0, 1.0), (1.0, DECIDED), (DECIDED, np.inf)):
-        some = [
-            s.after - s.before if s.right is not False else s.before - s.after
-            for s in steps
-            if low <= s.promised < high
-        ]
+        some = [s.achieved for s in steps if low <= s.promised < high and s.achieved is not None]
         if some:
-            print(
-                f"expected log Bayes factor {low:g} to {high:g}: achieved {np.median(some):.1f} (median of {len(some)})"
-            )
+            middle = f"{np.median(some):.1f} (median of {len(some)})"
+            print(f"expected log Bayes factor {low:g} to {high:g}: achieved {middle}")
     for word, k in (("recommended", 0), ("at random", 1)):
         counts = [MOST + 1 if pair[k].needed is None else pair[k].needed for pair in needed]
         print(f"{word}: {np.mean(counts):.2f} recordings until one reading is left, {MOST + 1} where {MOST} do not do")

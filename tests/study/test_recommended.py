@@ -39,8 +39,9 @@ def test_odds_of_sets_whatever_their_order():
 
 
 def test_a_promise_is_kept_by_a_decision_that_is_not_wrong():
-    assert Step("a", "b", 4.0, 0.0, 3.5, True).kept and Step("a", "b", 4.0, 0.0, -3.5, None).kept
-    assert not Step("a", "b", 4.0, 0.0, 3.5, False).kept and not Step("a", "b", 4.0, 0.0, 2.0, True).kept
+    assert Step("a", "b", 4.0, 0.0, 3.5, 1).kept and Step("a", "b", 4.0, 0.0, -3.5, 0).kept
+    assert not Step("a", "b", 4.0, 0.0, 3.5, -1).kept and not Step("a", "b", 4.0, 0.0, 2.0, 1).kept
+    assert Step("a", "b", 4.0, 0.5, -3.0, -1).achieved == 3.5 and Step("a", "b", 4.0, 0.5, -3.0, 0).achieved is None
 
 
 def test_recordings_are_added_until_one_reading_is_left(monkeypatch):

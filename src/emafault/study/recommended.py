@@ -30,8 +30,8 @@ Choose = Callable[[Sequence[Mapping[str, Any]]], Mapping[str, Any]]
 class Step:
     """One recording that was recommended, made and diagnosed with the others.
 
-    ``promised``: expected log Bayes factor between the leading set and its ``rival``; ``before``, ``after``: log odds of
-    the two; ``right``: whether the one that leads afterwards is what acts, None where neither is.
+    ``promised``: expected log Bayes factor between the leading set and its ``rival``; ``before``, ``after``: log odds
+    of the two; ``acts``: 1 where the leading set is what acts, -1 where its rival is, 0 where neither is.
     """
 
     leading: str
@@ -39,12 +39,17 @@ class Step:
     promised: float
     before: float
     after: float
-    right: bool | None
+    acts: int
 
     @property
     def kept(self) -> bool:
         """Whether what was promised is decided, and not wrongly."""
-        return abs(self.after) >= DECIDED and self.right is not False
+        return (self.acts * self.after if self.acts else abs(self.after)) >= DECIDED
+
+    @property
+    def achieved(self) -> float | None:
+        """Log Bayes factor for what acts; None where neither does."""
+        return self.acts * (self.after - self.before) if self.acts else None
 
 
 @dataclass(frozen=True)
@@ -123,13 +128,9 @@ def _one_left(verdict: Mapping[str, Any]) -> bool:
 def _step(case: Case, entry: Mapping[str, Any], before: Mapping[str, Any], after: Mapping[str, Any]) -> Step:
     leading, rival = (_set(name) for name in entry["separates"])
     truth = tuple(sorted(case.effects))
-    then = log_odds(after, leading, rival)
-    right = None
-    if truth in (leading, rival):
-        right = (then > 0.0) == (truth == leading)
     return Step(
         entry["separates"][0], entry["separates"][1], float(np.log(entry["expected_odds"])),
-        log_odds(before, leading, rival), then, right,
+        log_odds(before, leading, rival), log_odds(after, leading, rival), (truth == leading) - (truth == rival),
     )  # fmt: skip
 
 
