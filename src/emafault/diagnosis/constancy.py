@@ -69,7 +69,8 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     """Log posterior odds that what a unit of a set takes up goes along it with any coefficients, against the unit.
 
     The unit's columns times functions of what their rows lie along have coefficients of zero mean and any size there,
-    in the place of the unit in its own form or one near it: what is left over of another cause has them.
+    in the place of the unit in its own form or one near it: what is left over of another cause has them. Without such a
+    function they are the unit itself.
 
     Minus infinity for a unit that carries no form of its own.
     """
@@ -90,7 +91,7 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
         evidence(whole | {names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)}) for f in forms
     ]
     of = logsumexp([evidence(whole) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)])
-    kinds = dict.fromkeys(tuple(f.extra.tolist()) for f in forms)
+    kinds = dict.fromkeys(tuple(f.extra.tolist()) for f in forms if not all(names[k].endswith(".0") for k in f.extra))
     any_of = [evidence(rest | {names[k]: (0.0, s) for k in kind}) for kind in kinds for s in SHARES]
     return float(log_mean(any_of) - of + PRIOR)
 
