@@ -32,12 +32,16 @@ def residual(state: State) -> Dual:
     lead = 0.5 * a.control_period
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
-    model = np.asarray(value_of(position.shaft_angle(state)))
-    output = model + uniform_filter1d(rec.output - model, odd(AVERAGED / h), mode="nearest")
+    model = position.shaft_angle(state)
+    output = model + (rec.output - model).linear(lambda x: _averaged(x, h), rec.size)
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
-    seen = model + uniform_filter1d(rec.speed_recorded - model, odd(AVERAGED / h), mode="nearest")
+    seen = model + _averaged(rec.speed_recorded - model, h)
     wanted = p("controller.position_gain") * (
-        a.gear_ratio * (rec.once(("commanded",), lambda: _commanded(rec, lead)) - _at_ticks(output, h, lead))
+        a.gear_ratio
+        * (
+            rec.once(("commanded",), lambda: _commanded(rec, lead))
+            - output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
+        )
     )
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
@@ -62,6 +66,10 @@ def residual(state: State) -> Dual:
 
 def _calmed(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(SPEED_SPAN / h), mode="nearest")
+
+
+def _averaged(x: np.ndarray, h: float) -> np.ndarray:
+    return uniform_filter1d(x, odd(AVERAGED / h), mode="nearest")
 
 
 def _beyond(state: State) -> np.ndarray:
