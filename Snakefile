@@ -20,6 +20,9 @@ include: "workflow/rules/withheld.smk"
 include: "workflow/rules/evidence.smk"
 
 
+provenance.keep_known_sources()
+
+
 # The default target: everything that one experiment, or one study with its variants, results in.
 rule study:
     default_target: True

@@ -30,6 +30,7 @@ _KEYS = {*GROUPS, "name", "question", "dataset", "effects", "variants"}
 DIAGNOSED = ("actuator", "sensors", "tracking")
 LONGEST_KEY = 200
 _GIVEN = "emafault_given_experiment"
+RUNS_OF_A_SHARD = 1000  # some 4 s of work and 280 MB for runs of 1 s
 RANK_BINS = 20  # of the ranks of the check of the evidence
 #: what a dataset is for -> its place in the sequence of seeds
 PARTS = {"training": 0, "fresh": 1, "reference": 2}
@@ -302,7 +303,6 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "recording": _pick(recording, "duration", "interval", "theta_0"),
         "sensors": config["sensors"],
         "scheme": sampling["scheme"],
-        "shards": sampling["shards"],
         "seed": seed + PARTS[part],
         "unit_seed": seed + (PARTS[part] if part == "training" else PARTS["fresh"]),
         "tolerance": unit["training_tolerance" if part == "training" else "tolerance"],
@@ -311,11 +311,17 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "runs": sampling["runs"] if part == "training" else sampling["fresh"],
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
     }
+    spec["shards"] = sampling["shards"] or number_of_shards(spec["runs"] * spec["recordings_of_a_unit"])
     if config["unlisted"]:
         spec["unlisted"] = config["unlisted"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)
+
+
+def number_of_shards(runs: int) -> int:
+    """Files that a part is cut into: none with more runs than ``RUNS_OF_A_SHARD``, and work for two jobs."""
+    return min(runs, max(2, -(-runs // RUNS_OF_A_SHARD)))
 
 
 def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any]:

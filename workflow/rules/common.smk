@@ -9,6 +9,7 @@ from emafault import config as configuration
 from emafault import provenance
 from emafault.errors import InputError, one_line
 from emafault.places import refuse_folder
+from emafault.reporting import times
 
 RESULTS = "results"
 
@@ -48,11 +49,24 @@ def case_files(name):
     return [f"{RESULTS}/experiments/{case.path}/{name}" for case in PLAN.cases]
 
 
+def more(first):
+    """Megabytes or minutes of a job, doubled with every attempt after one that it took too much of."""
+    return lambda wildcards, attempt: first * 2 ** (attempt - 1)
+
+
 onstart:
     try:
         provenance.claim(RESULTS)
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
+
+
+onsuccess:
+    times.write(f"{RESULTS}/benchmarks")
+
+
+onerror:
+    times.write(f"{RESULTS}/benchmarks")
 
 
 # --- datasets and features ---
@@ -64,7 +78,7 @@ def dataset_spec(wildcards):
 
 def shards(case, part):
     """The files of one part of a case's dataset."""
-    number = case.config["sampling"]["shards"]
+    number = configuration.dataset_spec(case.config, part)["shards"]
     return [f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc" for shard in range(number)]
 
 
@@ -123,8 +137,8 @@ def chosen_network(wildcards):
     return search_results(wildcards)[1:] if wildcards.estimator == "searched" else []
 
 
-def histories(wildcards):
-    """One file of every trained estimator of a case."""
+def estimators(wildcards):
+    """The folder of every trained estimator of a case."""
     search = composed(wildcards)["search"]
     searched = search["reconstruction"] if search["trials"] else None
     names = [
@@ -136,12 +150,12 @@ def histories(wildcards):
             *(["searched"] if method == searched else []),
         )
     ]
-    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}/history.json" for name in names]
+    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}" for name in names]
 
 
 def exported_network(wildcards):
     """The network worth embedding: the searched one, else that of the last method."""
-    networks = [path for path in histories(wildcards) if "closed_form" not in path]
+    networks = [path for path in estimators(wildcards) if "closed_form" not in path]
     return ([path for path in networks if "identifiers/paper" not in path] or networks)[-1:]
 
 
@@ -186,7 +200,7 @@ WITHHELD = f"{RESULTS}/withheld"
 
 
 def bench_files(wildcards):
-    """The files of the bench."""
+    """The files of the bench; with a storage provider, copies of them."""
     try:
         return configuration.bench_files(BENCH)
     except InputError as error:

@@ -8,9 +8,11 @@ rule reconstruct_features:
         f"{CASE}/features/{{part}}_{{method}}.nc",
     log:
         f"{RESULTS}/logs/{{case}}/reconstruct_{{part}}_{{method}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/reconstruct_{{part}}_{{method}}.tsv"
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=more(2000),
+        runtime=more(60),
     params:
         spec=reconstruction_spec,
         code=code("reconstruct_features"),
@@ -25,9 +27,11 @@ rule compute_bound:
         f"{CASE}/bound.nc",
     log:
         f"{RESULTS}/logs/{{case}}/compute_bound.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/compute_bound.tsv"
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=more(2000),
+        runtime=more(60),
     params:
         spec=bound_spec,
         code=code("compute_bound"),

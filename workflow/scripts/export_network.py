@@ -6,5 +6,5 @@ from emafault.progress import one_line_errors
 from emafault.study.networks import export_network
 
 with one_line_errors(snakemake.log[0]):
-    folder = Path(snakemake.input.history[0]).parent
+    folder = Path(snakemake.input.network[0])
     export_network(folder, snakemake.input.features, snakemake.output.model, snakemake.output.check)

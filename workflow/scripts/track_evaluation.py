@@ -1,6 +1,7 @@
 """Log one evaluation with its search."""
 
 from emafault.progress import one_line_errors
+from emafault.study.networks import histories_in
 from emafault.study.tracked import track_evaluation
 
 with one_line_errors(snakemake.log[0]):
@@ -11,7 +12,7 @@ with one_line_errors(snakemake.log[0]):
         snakemake.params.spec,
         given.where[0],
         given.metrics,
-        given.histories,
+        histories_in(given.estimators),
         given.search,
         files,
         snakemake.output[0],

@@ -153,6 +153,11 @@ def export_network(folder: str | Path, features: str, model: str, check: str) ->
     write_json(check, export_onnx(network, model, read_features(features).identified().inputs))
 
 
+def histories_in(estimators: Sequence[str]) -> list[str]:
+    """History files of folders of estimators."""
+    return [f"{folder}/{HISTORY}" for folder in estimators]
+
+
 def folders(histories: Sequence[str]) -> list[Path]:
     """Folders of estimators from their history files."""
     return [Path(history).parent for history in histories]
