@@ -69,6 +69,7 @@ rule export_network:
         network=exported_network,
     output:
         model=f"{CASE}/export/network.onnx",
+        source=f"{CASE}/export/network.c",
         check=f"{CASE}/export/check.json",
     log:
         f"{RESULTS}/logs/{{case}}/export_network.log",

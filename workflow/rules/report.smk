@@ -113,6 +113,7 @@ rule track_evaluation:
         estimators=estimators,
         search=search_results,
         model=rules.export_network.output.model,
+        source=rules.export_network.output.source,
         report=rules.draw_report.output.report,
         figures=rules.draw_report.output.figures,
         configuration=rules.write_configuration.output,

@@ -1,4 +1,4 @@
-"""Export a trained network to ONNX."""
+"""Export a trained network to ONNX and to C99."""
 
 from pathlib import Path
 
@@ -7,4 +7,5 @@ from emafault.study.networks import export_network
 
 with one_line_errors(snakemake.log[0]):
     folder = Path(snakemake.input.network[0])
-    export_network(folder, snakemake.input.features, snakemake.output.model, snakemake.output.check)
+    out = snakemake.output
+    export_network(folder, snakemake.input.features, out.model, out.source, out.check)

@@ -6,7 +6,13 @@ from emafault.study.tracked import track_evaluation
 
 with one_line_errors(snakemake.log[0]):
     given = snakemake.input
-    files = {given.model: "model", given.report: "", given.figures: "figures", given.configuration[0]: ""}
+    files = {
+        given.model: "model",
+        given.source: "model",
+        given.report: "",
+        given.figures: "figures",
+        given.configuration[0]: "",
+    }
     track_evaluation(
         snakemake.wildcards.case,
         snakemake.params.spec,
