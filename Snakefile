@@ -16,6 +16,7 @@ include: "workflow/rules/identification.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/measured.smk"
 include: "workflow/rules/gap.smk"
+include: "workflow/rules/fleet.smk"
 include: "workflow/rules/withheld.smk"
 include: "workflow/rules/evidence.smk"
 

@@ -197,6 +197,9 @@ def title_and_question(wildcards):
 BENCH = str(config.get("bench", "")).rstrip("/")
 DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
 WITHHELD = f"{RESULTS}/withheld"
+BENCHES = str(config.get("benches", "")).rstrip("/")
+FLEET_NAME = configuration.bench_name(BENCHES)
+FLEET = f"{RESULTS}/fleets/{FLEET_NAME}"
 
 
 def bench_files(wildcards):
@@ -205,6 +208,20 @@ def bench_files(wildcards):
         return configuration.bench_files(BENCH)
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
+
+
+def batch_files(wildcards):
+    """The files of a batch of a fleet."""
+    return configuration.batch_files(configuration.batches(BENCHES)[int(wildcards.batch)])
+
+
+def fleet_batches(wildcards):
+    """One file of every batch of a fleet."""
+    try:
+        number = len(configuration.batches(BENCHES))
+    except InputError as error:
+        sys.exit(f"emafault: {one_line(error)}")
+    return [f"{FLEET}/batch_{n}.parquet" for n in range(number)]
 
 
 def withheld_measured(wildcards):

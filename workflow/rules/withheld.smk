@@ -38,7 +38,7 @@ rule score_cases:
         f"{RESULTS}/logs/withheld/{{draw}}/score_cases.log",
     benchmark:
         f"{RESULTS}/benchmarks/withheld/{{draw}}/score_cases.tsv"
-    threads: min(8, workflow.cores or 2)
+    threads: 2
     resources:
         mem_mb=more(2000),
         runtime=more(20),
