@@ -29,7 +29,8 @@ from house import NOT_RESULTS, ROOT, build, environment, snakemake
 SMOKE = ("--config", "experiment=smoke", "overrides=search.workers=1")
 #: who is killed, and how
 KILLS = [(kind, whole) for kind in (signal.SIGKILL, signal.SIGTERM) for whole in (True, False)]
-GONE_WITHIN = 90.0  # s that a job which outlives its killed study may take to end
+GONE_WITHIN = 300.0  # s that a job which outlives its killed study may take to end
+PATIENCE = 10.0  # s after SIGTERM
 
 
 @dataclass
@@ -181,9 +182,13 @@ def check_end(target: Target) -> None:
 
 
 def kill(process: subprocess.Popen, kind: signal.Signals, whole: bool) -> None:
-    """Kill a process, or it and all that it has started, and wait for its end."""
+    """Kill a process, or it and all that it has started; what SIGTERM has not ended is killed, as services are."""
     (os.killpg if whole else os.kill)(process.pid, kind)
-    process.wait(timeout=GONE_WITHIN)
+    try:
+        process.wait(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def bombard(target: Target, kills: int, rng: random.Random) -> dict[str, float]:
@@ -205,6 +210,7 @@ def bombard(target: Target, kills: int, rng: random.Random) -> dict[str, float]:
             kill(process, kind, whole)
             done += 1
             check_whole(target)
+            print(f"\r{done}", end="", file=sys.stderr, flush=True)
             continue
         assert code == 0, (target.house / "said.log").read_text()[-3000:]
         check_end(target)

@@ -31,6 +31,7 @@ DIAGNOSED = ("actuator", "sensors", "tracking")
 LONGEST_KEY = 200
 _GIVEN = "emafault_given_experiment"
 RUNS_OF_A_SHARD = 1000  # some 4 s of work and 280 MB for runs of 1 s
+SHARDS_OF_A_BLOCK = 5  # that one job reconstructs, some 20 s of work
 BENCHES_OF_A_BATCH = 20  # some 5 min of work
 RANK_BINS = 20  # of the ranks of the check of the evidence
 #: what a dataset is for -> its place in the sequence of seeds

@@ -32,6 +32,7 @@ wildcard_constraints:
     estimator="closed_form|network|searched",
     shard=r"\d+",
     worker=r"\d+",
+    block=r"\d+",
 
 
 def code(script):
@@ -84,6 +85,23 @@ def shards(case, part):
 
 def shards_of_part(wildcards):
     return shards(PLAN.case(wildcards.case), wildcards.part)
+
+
+def blocks_of_part(wildcards):
+    """The shards of a part in the blocks that jobs reconstruct, if there is more than one."""
+    files = shards_of_part(wildcards)
+    size = configuration.SHARDS_OF_A_BLOCK
+    return [files[n : n + size] for n in range(0, len(files), size)] if len(files) > size else []
+
+
+def shards_of_block(wildcards):
+    return blocks_of_part(wildcards)[int(wildcards.block)]
+
+
+def reconstructed_from(wildcards):
+    """The shards themselves, or what other jobs have reconstructed from blocks of them."""
+    stem = f"{RESULTS}/experiments/{wildcards.case}/features/{wildcards.part}_{wildcards.method}"
+    return [f"{stem}.{n}.nc" for n in range(len(blocks_of_part(wildcards)))] or shards_of_part(wildcards)
 
 
 def feature_tables(case, part):
