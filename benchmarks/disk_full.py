@@ -1,4 +1,4 @@
-"""The disk full at ten random moments of the smoke study: one clear line each, and nothing that was made is lost.
+"""The disk full at ten random moments of a small study: one clear line each, and nothing that was made is lost.
 
     python benchmarks/disk_full.py [--times 10] [--seed 0]
 
@@ -13,10 +13,9 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from house import build, environment, snakemake
+from house import SMALL, build, environment, snakemake
 from kills import of_the_study, plain
 
-SMOKE = ("--config", "experiment=smoke", "overrides=search.workers=1")
 ROOM = 400  # MB, more than the study takes
 
 
@@ -29,7 +28,7 @@ def results(house: Path) -> dict[str, bytes]:
 def study(house: Path) -> subprocess.CompletedProcess:
     """Run the study, one job at a time, so that one is hit."""
     return subprocess.run(
-        snakemake(*SMOKE, cores="1"), cwd=house, env=environment(house), capture_output=True, text=True
+        snakemake(*SMALL, cores="1"), cwd=house, env=environment(house), capture_output=True, text=True
     )
 
 

@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+#: a study of every stage but the search, small; its results are the same bits in every run
+SMALL = ("--config", "experiment=smoke", "overrides=search=none sampling.runs=60 evaluation.seeds=1 training.epochs=30")
 PARTS = ("workflow", "profiles", "conf", "src", "data")
 #: folders of what was said and when, and of runs, which have times and numbers of their own
 NOT_RESULTS = ("logs", "benchmarks", "mlflow_artifacts", "diagnoses")

@@ -47,7 +47,7 @@ ReturnToService=2
 
 
 @contextlib.contextmanager
-def cluster(cores: int = 2, memory: int = 6000) -> Iterator[dict[str, str]]:
+def cluster(cores: int = 2, memory: int = 8000) -> Iterator[dict[str, str]]:
     """Two nodes of so many cores and megabytes in the partition ``short``; what the environment needs to use it."""
     lacking = [program for program in PROGRAMS if not shutil.which(program)]
     if lacking or os.geteuid() != 0:
@@ -66,12 +66,23 @@ def cluster(cores: int = 2, memory: int = 6000) -> Iterator[dict[str, str]]:
         lines.append("PartitionName=short Nodes=node[1-2] Default=YES MaxTime=60 State=UP")
         conf = folder / "slurm.conf"
         conf.write_text("\n".join(lines) + "\n")
+        _stand_in(conf, stack)
         environment = {"SLURM_CONF": str(conf)}
         _started(["slurmctld", "-D", "-f", str(conf)], environment, folder, stack)
         for n in (1, 2):
             _started(["slurmd", "-D", "-N", f"node{n}", "-f", str(conf)], environment, folder, stack)
         _wait_until_idle(environment, folder)
         yield environment
+
+
+def _stand_in(conf: Path, stack: contextlib.ExitStack) -> None:
+    """Put the configuration where jobs look for it, since they do not inherit SLURM_CONF."""
+    place = Path("/etc/slurm/slurm.conf")
+    if os.path.lexists(place):
+        raise SystemExit(f"{place} exists: this machine belongs to a cluster already")
+    place.parent.mkdir(exist_ok=True)
+    place.symlink_to(conf)
+    stack.callback(place.unlink)
 
 
 def _munge(folder: Path, stack: contextlib.ExitStack) -> None:
