@@ -46,7 +46,7 @@ def slurm(nodes: dict[str, str], *command: str) -> str:
     return subprocess.run(command, env={**os.environ, **nodes}, capture_output=True, text=True).stdout
 
 
-def running_job(nodes: dict[str, str], within: float = 120.0) -> tuple[str, str]:
+def running_job(nodes: dict[str, str], within: float = 240.0) -> tuple[str, str]:
     """Number and node of a job that runs."""
     deadline = time.monotonic() + within
     while time.monotonic() < deadline:
@@ -83,7 +83,7 @@ def try_results(house: Path, nodes: dict[str, str]) -> str:
 
 def try_scancel(house: Path, nodes: dict[str, str]) -> str:
     """A job that is cancelled is done again."""
-    process = run(house, nodes, *SMALL, SHARD.format("training"), "--forcerun", "simulate_shard")
+    process = run(house, nodes, SHARD.format("training"), *SMALL, "--forcerun", "simulate_shard")
     number, _ = running_job(nodes)
     slurm(nodes, "scancel", number)
     code, said = ended(house, process)
@@ -93,7 +93,7 @@ def try_scancel(house: Path, nodes: dict[str, str]) -> str:
 
 def try_drain(house: Path, nodes: dict[str, str]) -> str:
     """A node that goes down takes a job with it, which is done on the other."""
-    process = run(house, nodes, *SMALL, SHARD.format("fresh"), "--forcerun", "simulate_shard")
+    process = run(house, nodes, SHARD.format("fresh"), *SMALL, "--forcerun", "simulate_shard")
     number, node = running_job(nodes)
     slurm(nodes, "scontrol", "update", f"NodeName={node}", "State=DRAIN", "Reason=trial")
     slurm(nodes, "scontrol", "requeue", number)
@@ -109,7 +109,7 @@ def try_time(house: Path, nodes: dict[str, str]) -> str:
     more = ("--set-resources", "simulate_shard:runtime='1 if attempt == 1 else 30'")
     target = "results/datasets/long/training/shard_0.nc"
     slow = "overrides=search.workers=1 sampling.runs=100000 sampling.fresh=10 sampling.shards=1 name=long dataset=long"
-    process = run(house, nodes, "--config", "experiment=smoke", slow, *more, target)
+    process = run(house, nodes, target, "--config", "experiment=smoke", slow, *more)
     code, said = ended(house, process, 1800.0)
     assert "TIMEOUT" in said and code == 0, said[-3000:]
     return "past its limit of 1 min, done with 30"
@@ -118,7 +118,7 @@ def try_time(house: Path, nodes: dict[str, str]) -> str:
 def try_memory(house: Path, nodes: dict[str, str]) -> str:
     """A job that takes more memory than it asked for gets more at the next attempt."""
     more = ("--set-resources", "simulate_shard:mem_mb='60 if attempt == 1 else 1000'")
-    process = run(house, nodes, *SMALL, *more, SHARD.format("training"), "--forcerun", "simulate_shard")
+    process = run(house, nodes, SHARD.format("training"), *SMALL, *more, "--forcerun", "simulate_shard")
     code, said = ended(house, process)
     assert code == 0 and "Trying to restart" in said, said[-3000:]
     return "more than its 60 MB, done with 1000"
@@ -128,7 +128,7 @@ def try_line(house: Path, nodes: dict[str, str]) -> str:
     """A job that fails at every attempt ends in one line, and nothing made is lost."""
     before = results(house)
     more = ("--set-resources", "simulate_shard:mem_mb=60")
-    process = run(house, nodes, *SMALL, *more, SHARD.format("training"), "--forcerun", "simulate_shard")
+    process = run(house, nodes, SHARD.format("training"), *SMALL, *more, "--forcerun", "simulate_shard")
     code, said = ended(house, process)
     lines = [line for line in said.splitlines() if line.startswith("emafault: ")]
     assert code != 0 and len(lines) == 1, said[-3000:]

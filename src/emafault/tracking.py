@@ -19,6 +19,7 @@ from typing import Any
 from . import __version__
 from .databases import SQLITE, locked, with_driver, without_password
 from .errors import InputError
+from .io.atomic import replace_atomically
 from .places import kind
 from .processes import still_there, this_process
 
@@ -150,6 +151,17 @@ def _experiment_id(client, uri: str, name: str) -> str:
         return found.experiment_id
 
 
+def _create(path: Path) -> None:
+    """Create a database of runs, whole or not at all: MLflow cannot go on with one whose tables are half made."""
+    from mlflow import MlflowClient
+
+    if path.exists():
+        return
+    for journal in path.parent.glob(f".{path.name}.*.part-journal"):  # of one that was killed; the lock is ours
+        journal.unlink()
+    replace_atomically(path, lambda temporary: MlflowClient(f"{SQLITE}{temporary}").search_experiments())
+
+
 @contextlib.contextmanager
 def _client(uri: str) -> Iterator[Any]:
     """A client, with the local database locked while it is open."""
@@ -168,6 +180,8 @@ def _client(uri: str) -> Iterator[Any]:
                 if kind(path, "tracking.uri") not in ("", "file"):  # MLflow tries for minutes to open it
                     raise InputError(f"tracking.uri: {uri} cannot be used (not a file)")
             stack.enter_context(locked(uri))
+            if uri.startswith(SQLITE):
+                _create(Path(uri.removeprefix(SQLITE)))
             yield MlflowClient(tracking_uri=with_driver(uri))
         except (MlflowException, SQLAlchemyError, ImportError, OSError) as error:
             reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -77,6 +78,21 @@ def test_two_studies_log_to_fresh_databases_at_once(postgresql):
     address = f"{postgresql}/template1"
     done, said = together(address, -2)
     assert done == 2, said
+
+
+def test_a_database_of_runs_whose_creation_is_killed_is_created_again(tmp_path):
+    address = f"sqlite:///{tmp_path}/runs.db"
+    code = "import sys; from emafault.tracking import ensure_experiment; ensure_experiment(sys.argv[1], 'one')"
+    process = subprocess.Popen([sys.executable, "-c", code, address])
+    deadline = time.monotonic() + 60.0
+    while not list(tmp_path.glob(".runs.db.*.part")):  # its tables are being made
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    assert not (tmp_path / "runs.db").exists()
+    subprocess.run([sys.executable, "-c", code, address], check=True)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".runs.db.lock", "runs.db"]
 
 
 def test_an_address_gets_the_driver_that_is_installed_and_loses_its_password():
