@@ -11,6 +11,7 @@ from .fleet import COMPONENTS, NAMED
 
 Row = Mapping[str, Any]
 TOLD = 0.9  # probability from which a change is told
+CHANGE = 0.05  # of a component, as large as one that changes is expected to
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ def histories(rows: Sequence[Row]) -> dict[str, list[Row]]:
 def changes(before: Row, after: Row, least: float = TOLD) -> list[Change]:
     """What changed, the most probable first.
 
-    Both posteriors are taken for independent. An effect appeared with p_after (1 - p_before); a component of the fault
-    vector rose with the probability that a difference of two normal values is above zero.
+    Both posteriors are taken for independent. An effect appeared with p_after (1 - p_before); of a component of the
+    fault vector see ``changed``.
     """
     found = []
     for effect in EFFECTS:
@@ -52,10 +53,22 @@ def changes(before: Row, after: Row, least: float = TOLD) -> list[Change]:
         values = [row[key] for row in (before, after) for key in (name, f"{name}_sd")]
         if None not in values:
             first, sd_first, second, sd_second = values
-            rose = NormalDist(second - first, max((sd_first**2 + sd_second**2) ** 0.5, 1e-12)).cdf(0.0)
-            kind, probability = ("rose", 1.0 - rose) if rose < 0.5 else ("fell", rose)
-            found.append(Change(name, kind, probability, first, second))
+            sd = max((sd_first**2 + sd_second**2) ** 0.5, 1e-12)
+            kind = "rose" if second > first else "fell"
+            found.append(Change(name, kind, changed(second - first, sd), first, second))
     return sorted((c for c in found if c.probability >= least), key=lambda c: -c.probability)
+
+
+def changed(difference: float, sd: float) -> float:
+    """Probability that a component of the fault vector is another one, even odds and N(0, ``CHANGE``^2) beforehand.
+
+    Parameters
+    ----------
+    difference : of two estimates (1)
+    sd : its standard deviation
+    """
+    one, other = NormalDist(0.0, sd).pdf(difference), NormalDist(0.0, (sd**2 + CHANGE**2) ** 0.5).pdf(difference)
+    return other / (one + other) if one + other > 0.0 else 1.0
 
 
 def since(history: Sequence[Row], effect: str) -> Row | None:
