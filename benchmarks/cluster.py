@@ -106,7 +106,7 @@ def try_drain(house: Path, nodes: dict[str, str]) -> str:
 
 def try_time(house: Path, nodes: dict[str, str]) -> str:
     """A job that takes longer than its limit gets more at the next attempt."""
-    more = ("--set-resources", "simulate_shard:runtime='1 if attempt == 1 else 30'")
+    more = ("--set-resources", "simulate_shard:runtime=1 if attempt == 1 else 30")
     target = "results/datasets/long/training/shard_0.nc"
     slow = "overrides=search.workers=1 sampling.runs=100000 sampling.fresh=10 sampling.shards=1 name=long dataset=long"
     process = run(house, nodes, target, "--config", "experiment=smoke", slow, *more)
@@ -117,7 +117,7 @@ def try_time(house: Path, nodes: dict[str, str]) -> str:
 
 def try_memory(house: Path, nodes: dict[str, str]) -> str:
     """A job that takes more memory than it asked for gets more at the next attempt."""
-    more = ("--set-resources", "simulate_shard:mem_mb='60 if attempt == 1 else 1000'")
+    more = ("--set-resources", "simulate_shard:mem_mb=60 if attempt == 1 else 1000")
     process = run(house, nodes, SHARD.format("training"), *SMALL, *more, "--forcerun", "simulate_shard")
     code, said = ended(house, process)
     assert code == 0 and "Trying to restart" in said, said[-3000:]

@@ -63,7 +63,7 @@ def cluster(cores: int = 2, memory: int = 8000) -> Iterator[dict[str, str]]:
         for n, port in enumerate(ports[1:], start=1):
             node = f"NodeName=node{n} NodeHostname={host} NodeAddr=127.0.0.1 Port={port}"
             lines.append(f"{node} CPUs={cores} RealMemory={memory} State=UNKNOWN")
-        lines.append("PartitionName=short Nodes=node[1-2] Default=YES MaxTime=60 State=UP")
+        lines.append("PartitionName=short Nodes=node[1-2] Default=YES MaxTime=240 State=UP")
         conf = folder / "slurm.conf"
         conf.write_text("\n".join(lines) + "\n")
         _stand_in(conf, stack)

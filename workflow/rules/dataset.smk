@@ -30,7 +30,7 @@ rule simulate_shard:
         f"{RESULTS}/benchmarks/{{dataset}}/simulate_{{part}}_{{shard}}.tsv"
     resources:
         mem_mb=more(1000),
-        runtime=more(60),
+        runtime=more(20),
     params:
         spec=dataset_spec,
         code=code("simulate_shard"),

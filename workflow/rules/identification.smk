@@ -55,7 +55,7 @@ rule train_identifier:
         f"{RESULTS}/benchmarks/{{case}}/train_{{method}}_{{estimator}}.tsv"
     resources:
         mem_mb=more(2000),
-        runtime=more(60),
+        runtime=more(30),
     params:
         spec=training_spec,
         code=code("train_identifier"),

@@ -12,7 +12,7 @@ rule reconstruct_block:
         f"{RESULTS}/benchmarks/{{case}}/reconstruct_{{part}}_{{method}}_{{block}}.tsv"
     resources:
         mem_mb=more(1000),
-        runtime=more(60),
+        runtime=more(20),
     params:
         spec=reconstruction_spec,
         code=code("reconstruct_features"),
@@ -32,7 +32,7 @@ rule reconstruct_features:
         f"{RESULTS}/benchmarks/{{case}}/reconstruct_{{part}}_{{method}}.tsv"
     resources:
         mem_mb=more(2000),
-        runtime=more(60),
+        runtime=more(20),
     params:
         spec=reconstruction_spec,
         joined=lambda wildcards: bool(blocks_of_part(wildcards)),
@@ -52,7 +52,7 @@ rule compute_bound:
         f"{RESULTS}/benchmarks/{{case}}/compute_bound.tsv"
     resources:
         mem_mb=more(2000),
-        runtime=more(60),
+        runtime=more(20),
     params:
         spec=bound_spec,
         code=code("compute_bound"),
