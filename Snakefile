@@ -16,8 +16,12 @@ include: "workflow/rules/identification.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/measured.smk"
 include: "workflow/rules/gap.smk"
+include: "workflow/rules/fleet.smk"
 include: "workflow/rules/withheld.smk"
 include: "workflow/rules/evidence.smk"
+
+
+provenance.keep_known_sources()
 
 
 # The default target: everything that one experiment, or one study with its variants, results in.

@@ -79,7 +79,7 @@ def main() -> None:
             shutil.copytree(ROOT / folder, house / folder, ignore=ignore)
         shutil.copy(ROOT / "Snakefile", house)
         print("| compiling the simulation | {:.1f} | {:.1f} |".format(*snakemake(house, "results/compiled.txt")))
-        shards = [f"results/datasets/paper/training/shard_{n}.nc" for n in range(4)]
+        shards = [f"results/datasets/paper/training/shard_{n}.nc" for n in range(2)]
         print("| 600 runs of 1 s simulated and written | {:.1f} | {:.1f} |".format(*snakemake(house, *shards)))
         if args.study:
             print("| the rest of the default study | {:.0f} | {:.0f} |".format(*snakemake(house)))

@@ -75,7 +75,7 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     for key, discard in {"recording.discard": recording["discard"], **discards}.items():
         if discard > recording["duration"] - 0.15:
             schema.refuse(key, discard, "at least 0.15 s less than recording.duration")
-    if config["sampling"]["shards"] > min(config["sampling"]["runs"], config["sampling"]["fresh"]):
+    if (config["sampling"]["shards"] or 1) > min(config["sampling"]["runs"], config["sampling"]["fresh"]):
         schema.refuse("sampling.shards", config["sampling"]["shards"], "no more than sampling.runs and sampling.fresh")
     _check_space(config["search"]["space"])
     if config["search"]["reconstruction"] not in config["reconstruction"] and config["search"]["trials"]:

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from .paths import EFFECTS, PACKAGE
+from .paths import CACHE, EFFECTS, PACKAGE
 
 _SOURCES = [
     Path(__file__).resolve(),
@@ -24,8 +24,7 @@ def source_digest() -> str:
 
 # numba invalidates a cached function by the time of its own file only; a folder per digest covers its callees too.
 # It must be set before numba is imported, and never overrides what the user has set.
-_ROOT = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "emafault" / source_digest()))
+os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE / source_digest()))
 
 import numba  # noqa: E402
 import numpy as np  # noqa: E402

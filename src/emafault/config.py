@@ -30,6 +30,9 @@ _KEYS = {*GROUPS, "name", "question", "dataset", "effects", "variants"}
 DIAGNOSED = ("actuator", "sensors", "tracking")
 LONGEST_KEY = 200
 _GIVEN = "emafault_given_experiment"
+RUNS_OF_A_SHARD = 1000  # some 4 s of work and 280 MB for runs of 1 s
+SHARDS_OF_A_BLOCK = 5  # that one job reconstructs, some 20 s of work
+BENCHES_OF_A_BATCH = 20  # some 5 min of work
 RANK_BINS = 20  # of the ranks of the check of the evidence
 #: what a dataset is for -> its place in the sequence of seeds
 PARTS = {"training": 0, "fresh": 1, "reference": 2}
@@ -302,7 +305,6 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "recording": _pick(recording, "duration", "interval", "theta_0"),
         "sensors": config["sensors"],
         "scheme": sampling["scheme"],
-        "shards": sampling["shards"],
         "seed": seed + PARTS[part],
         "unit_seed": seed + (PARTS[part] if part == "training" else PARTS["fresh"]),
         "tolerance": unit["training_tolerance" if part == "training" else "tolerance"],
@@ -311,11 +313,17 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "runs": sampling["runs"] if part == "training" else sampling["fresh"],
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
     }
+    spec["shards"] = sampling["shards"] or number_of_shards(spec["runs"] * spec["recordings_of_a_unit"])
     if config["unlisted"]:
         spec["unlisted"] = config["unlisted"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)
+
+
+def number_of_shards(runs: int) -> int:
+    """Files that a part is cut into: none with more runs than ``RUNS_OF_A_SHARD``, and work for two jobs."""
+    return min(runs, max(2, -(-runs // RUNS_OF_A_SHARD)))
 
 
 def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any]:
@@ -451,8 +459,41 @@ def bench_files(bench: str) -> list[str]:
     return files
 
 
+@functools.cache
+def batches(folder: str) -> list[list[str]]:
+    """Benches of a fleet, folders of recordings in a folder, in the batches that jobs diagnose.
+
+    Raises
+    ------
+    InputError : no folder given, none of recordings in it, or one whose path the workflow cannot take
+    """
+    if not folder:
+        raise InputError("benches: none given, --config benches=DIR names a folder of benches")
+    if kind(folder, "benches") != "folder":
+        raise InputError(f"benches: {shown(folder)}: no such folder")
+    found = [str(p) for p in sorted(Path(folder).iterdir()) if p.is_dir() and any(p.glob("*.nc"))]
+    if not found:
+        raise InputError(f"benches: {shown(folder)}: holds no folder with recordings (*.nc)")
+    return [found[n : n + BENCHES_OF_A_BATCH] for n in range(0, len(found), BENCHES_OF_A_BATCH)]
+
+
+def batch_files(benches: Iterable[str]) -> list[str]:
+    """Recordings of benches, for the workflow.
+
+    Raises
+    ------
+    InputError : as ``bench_files``
+    """
+    return [file for bench in benches for file in bench_files(bench) if file.endswith(".nc")]
+
+
+def fleet_digest(config: Mapping[str, Any]) -> str:
+    """What tells rows of a fleet apart that were made by another configuration."""
+    return hashlib.sha256(repr(_pick(config, "actuator", "sensors")).encode()).hexdigest()[:8]
+
+
 #: what ``snakemake --config`` may set
-CALL = ("experiment", "overrides", "bench", "twin")
+CALL = ("experiment", "overrides", "bench", "benches", "twin")
 
 
 def check_call(call: Mapping[str, Any]) -> None:
@@ -469,10 +510,12 @@ def check_call(call: Mapping[str, Any]) -> None:
     for key, value in call.items():
         if key not in CALL:
             raise InputError(schema.unknown_key(key, "", CALL).replace("the configuration", "--config"))
-        if key in ("bench", "twin") and not isinstance(value, str):
+        if key in ("bench", "benches", "twin") and not isinstance(value, str):
             raise InputError(f"{key}: got {shown(repr(value))}, accepted is one word")
     if call.get("bench"):
         bench_files(call["bench"])
+    if call.get("benches"):
+        batches(call["benches"])
     if call.get("twin", "actuator") != "actuator":
         from .machines.library import stated
 

@@ -1,8 +1,11 @@
 """Where configuration and results are: of a clone beside the sources, of an installed package in it and in the working
 folder."""
 
+import os
 from pathlib import Path
 
+#: what can be made again: compiled code, digests of sources
+CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "emafault"
 PACKAGE = Path(__file__).resolve().parent
 _CLONE = PACKAGE.parents[1]
 _CLONED = (_CLONE / "conf" / "config.yaml").is_file()

@@ -1,15 +1,21 @@
 """What the workflow runs, as digests of sources, and the claim on where it writes."""
 
 import ast
+import contextlib
 import fcntl
 import functools
 import hashlib
+import json
+import os
+import sys
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from .errors import InputError
-from .paths import EFFECTS, PACKAGE
+from .paths import CACHE, EFFECTS, PACKAGE
 
+_KNOWN = CACHE / "sources.json"  # digest of a source's bytes -> what it means and imports, since parsing takes seconds
+_MOST = 5000  # sources that are kept
 _claims: list[IO[str]] = []  # held as long as the process lives
 
 
@@ -51,9 +57,34 @@ def source_digest(script: str | Path) -> str:
 @functools.cache
 def _read_source(path: Path) -> tuple[str, list[Path]]:
     """Digest of what a module means and the files of this package that it imports."""
-    tree = ast.parse(path.read_bytes())
-    imported = _imports(tree, path)
-    return hashlib.sha256(_meaning(tree).encode()).hexdigest(), imported
+    source, known = path.read_bytes(), _known_sources()
+    key = hashlib.sha256(f"{sys.version_info}{_dotted(path)}\0".encode() + source).hexdigest()
+    if key not in known:
+        tree = ast.parse(source)
+        names = sorted({name for name in _imports(tree, path) if name.split(".")[0] == "emafault"})
+        known[key] = [hashlib.sha256(_meaning(tree).encode()).hexdigest(), names]
+    digest, names = known[key]
+    return digest, [file for name in names for file in _files(name)]
+
+
+@functools.cache
+def _known_sources() -> dict[str, list[Any]]:
+    """What was parsed before."""
+    try:
+        read = json.loads(_KNOWN.read_text())
+        return read if isinstance(read, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
+def keep_known_sources() -> None:
+    """Keep what was parsed for the next call; what cannot be kept is parsed again."""
+    temporary = _KNOWN.with_name(f".{_KNOWN.name}.{os.getpid()}.part")
+    with contextlib.suppress(OSError):
+        _KNOWN.parent.mkdir(parents=True, exist_ok=True)
+        used = dict(list(_known_sources().items())[-_MOST:])
+        temporary.write_text(json.dumps(used))
+        os.replace(temporary, _KNOWN)
 
 
 def _meaning(tree: ast.AST) -> str:
@@ -66,12 +97,17 @@ def _meaning(tree: ast.AST) -> str:
     return ast.dump(tree)
 
 
-def _imports(tree: ast.AST, path: Path) -> list[Path]:
-    """Files of this package that a module imports anywhere, its packages' own included."""
-    dotted = ""
-    if path.is_relative_to(PACKAGE):
-        dotted = ".".join(("emafault", *path.relative_to(PACKAGE).with_suffix("").parts))
-        dotted = dotted if path.name != "__init__.py" else dotted.removesuffix(".__init__") + "._"
+def _dotted(path: Path) -> str:
+    """The name of a module of this package, by which it resolves relative imports; of a script nothing."""
+    if not path.is_relative_to(PACKAGE):
+        return ""
+    dotted = ".".join(("emafault", *path.relative_to(PACKAGE).with_suffix("").parts))
+    return dotted if path.name != "__init__.py" else dotted.removesuffix(".__init__") + "._"
+
+
+def _imports(tree: ast.AST, path: Path) -> list[str]:
+    """Names that a module imports anywhere, those of this package in full."""
+    dotted = _dotted(path)
     names = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -80,11 +116,14 @@ def _imports(tree: ast.AST, path: Path) -> list[Path]:
             parent = ".".join(dotted.split(".")[: -node.level]) if node.level else ""
             module = ".".join(part for part in (parent, node.module or "") if part)
             names += [module, *(f"{module}.{alias.name}" for alias in node.names)]
-    found = []
-    for name in names:
-        words = name.split(".")
-        if words[0] == "emafault":
-            for depth in range(1, len(words) + 1):
-                stem = PACKAGE.joinpath(*words[1:depth])
-                found += [p for p in (stem / "__init__.py", stem.with_suffix(".py")) if p.is_file() and stem != p]
+    return names
+
+
+@functools.cache
+def _files(name: str) -> list[Path]:
+    """Files of this package that importing a name reads, its packages' own included."""
+    found, words = [], name.split(".")
+    for depth in range(1, len(words) + 1):
+        stem = PACKAGE.joinpath(*words[1:depth])
+        found += [p for p in (stem / "__init__.py", stem.with_suffix(".py")) if p.is_file() and stem != p]
     return found

@@ -152,7 +152,7 @@ class Sampling:
     runs: int = number(20, 10_000_000)
     fresh: int = number(10, 10_000_000)
     seed: int = number(0, 2**31)
-    shards: int = number(1, 1000)
+    shards: int | None = number(1, 100_000)
 
 
 @dataclass

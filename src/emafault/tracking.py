@@ -5,7 +5,7 @@ several processes create or migrate one.
 """
 
 import contextlib
-import fcntl
+import json
 import logging
 import os
 import re
@@ -17,10 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .databases import SQLITE, locked, with_driver, without_password
 from .errors import InputError
+from .io.atomic import replace_atomically
 from .places import kind
+from .processes import still_there, this_process
 
-_SQLITE = "sqlite:///"
+_OWNER = "emafault.owner"  # tag of the process that logs a run
 _LONGEST_VALUE = 6000
 
 
@@ -76,12 +79,23 @@ def log_run(uri: str, experiment: str, entry: Entry) -> str:
     InputError : a server or file that cannot be used
     """
     with _client(uri) as client:
-        return _log(client, _experiment_id(client, uri, experiment), entry, {})
+        experiment_id = _experiment_id(client, uri, experiment)
+        _end_abandoned(client, experiment_id)
+        return _log(client, experiment_id, entry, {})
+
+
+def _end_abandoned(client, experiment_id: str) -> None:
+    """Mark runs as killed whose logging a killed process of this host left unfinished."""
+    for run in client.search_runs([experiment_id], "attributes.status = 'RUNNING'"):
+        owner = run.data.tags.get(_OWNER)
+        if owner and still_there(json.loads(owner)) is False:
+            client.set_terminated(run.info.run_id, "KILLED")
 
 
 def _log(client, experiment_id: str, entry: Entry, tags: Mapping[str, str]) -> str:
     now = int(1000 * time.time())
     every = {"mlflow.source.name": "emafault", "code_version": code_version(), **entry.tags, **tags}
+    every[_OWNER] = json.dumps(this_process())
     run = client.create_run(experiment_id, start_time=now, run_name=entry.name, tags=every).info.run_id
     try:
         _fill(client, experiment_id, run, entry, now)
@@ -126,9 +140,26 @@ def _experiment_id(client, uri: str, name: str) -> str:
     if found:
         return found.experiment_id
     location = None
-    if uri.startswith(_SQLITE):
-        location = (Path(uri.removeprefix(_SQLITE)).resolve().parent / "mlflow_artifacts").as_uri()
-    return client.create_experiment(name, artifact_location=location)
+    if uri.startswith(SQLITE):
+        location = (Path(uri.removeprefix(SQLITE)).resolve().parent / "mlflow_artifacts").as_uri()
+    try:
+        return client.create_experiment(name, artifact_location=location)
+    except Exception:
+        found = client.get_experiment_by_name(name)  # another process was first
+        if found is None:
+            raise
+        return found.experiment_id
+
+
+def _create(path: Path) -> None:
+    """Create a database of runs, whole or not at all: MLflow cannot go on with one whose tables are half made."""
+    from mlflow import MlflowClient
+
+    if path.exists():
+        return
+    for journal in path.parent.glob(f".{path.name}.*.part-journal"):  # of one that was killed; the lock is ours
+        journal.unlink()
+    replace_atomically(path, lambda temporary: MlflowClient(f"{SQLITE}{temporary}").search_experiments())
 
 
 @contextlib.contextmanager
@@ -144,14 +175,14 @@ def _client(uri: str) -> Iterator[Any]:
 
     with contextlib.ExitStack() as stack:
         try:
-            if uri.startswith(_SQLITE):
-                path = Path(uri.removeprefix(_SQLITE))
+            if uri.startswith(SQLITE):
+                path = Path(uri.removeprefix(SQLITE))
                 if kind(path, "tracking.uri") not in ("", "file"):  # MLflow tries for minutes to open it
                     raise InputError(f"tracking.uri: {uri} cannot be used (not a file)")
-                path.parent.mkdir(parents=True, exist_ok=True)
-                lock = stack.enter_context(open(path.with_name(f".{path.name}.lock"), "w"))
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            yield MlflowClient(tracking_uri=uri)
-        except (MlflowException, SQLAlchemyError, OSError) as error:
+            stack.enter_context(locked(uri))
+            if uri.startswith(SQLITE):
+                _create(Path(uri.removeprefix(SQLITE)))
+            yield MlflowClient(tracking_uri=with_driver(uri))
+        except (MlflowException, SQLAlchemyError, ImportError, OSError) as error:
             reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())
-            raise InputError(f"tracking.uri: {uri} cannot be used ({reason[:300]})") from error
+            raise InputError(f"tracking.uri: {without_password(uri)} cannot be used ({reason[:300]})") from error

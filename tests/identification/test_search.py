@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from optuna.trial import TrialState
 
 from emafault.errors import InputError
 from emafault.identification import search
@@ -86,6 +87,54 @@ def test_workers_share_a_journal_and_resume_after_a_kill(data, tmp_path):
     assert [worker.wait(timeout=120) for worker in workers] == [0, 0]
     trials = search.summarise(journal, search.SearchSettings(**plain), *data)
     assert len(trials) == asked  # neither fewer for the killed trial nor more for the second worker
+
+
+def test_a_search_that_was_killed_goes_on_as_it_would_have(data, tmp_path):
+    class Killed(Exception):
+        pass
+
+    def kill(done, asked):
+        if done == 3:
+            raise Killed
+
+    search.run_worker(tmp_path / "whole", settings(8), *data)
+    with pytest.raises(Killed):
+        search.run_worker(tmp_path / "killed", settings(8), *data, progress=kill)
+    search.run_worker(tmp_path / "killed", settings(8), *data)
+    whole, killed = (search.summarise(tmp_path / name, settings(8), *data) for name in ("whole", "killed"))
+    assert [(t.error, t.network, t.training) for t in whole] == [(t.error, t.network, t.training) for t in killed]
+
+
+def test_a_trial_that_another_worker_told_failed_does_not_end_its_owner(data, tmp_path, monkeypatch):
+    true_error, told = search.trial_error, []
+
+    def error(*arguments):
+        if not told:  # as a worker of another host does that saw no heartbeat
+            study = search.open_study(tmp_path / "journal", search.study_name(settings(3), *data))
+            told.append(study.get_trials()[-1].number)
+            study.tell(told[0], state=TrialState.FAIL)
+        return true_error(*arguments)
+
+    monkeypatch.setattr(search, "trial_error", error)
+    assert search.run_worker(tmp_path / "journal", settings(3), *data) == 3
+    assert told and told[0] not in [t.number for t in search.summarise(tmp_path / "journal", settings(3), *data)]
+
+
+def test_a_trial_of_another_host_is_abandoned_once_its_heartbeat_stops(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(search, "ABANDONED_AFTER", 1.0)
+    monkeypatch.setattr(search, "HEARTBEAT", 0.2)
+    study = search.open_study(tmp_path / "journal", search.study_name(settings(1), *data))
+    owned = study.ask()
+    owned.set_user_attr("owner", ["elsewhere", 1, "1"])
+    watch = search._Watch()
+    with search._beating(owned):
+        until = time.monotonic() + 1.6
+        while time.monotonic() < until:
+            watch.bury_abandoned(study)
+            time.sleep(0.1)
+        assert study.get_trials()[0].state == TrialState.RUNNING
+    assert search.run_worker(tmp_path / "journal", settings(1), *data) == 1
+    assert study.get_trials()[0].state == TrialState.FAIL
 
 
 def test_another_storage_is_a_setting(data, tmp_path):

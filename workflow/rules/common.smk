@@ -9,6 +9,7 @@ from emafault import config as configuration
 from emafault import provenance
 from emafault.errors import InputError, one_line
 from emafault.places import refuse_folder
+from emafault.reporting import times
 
 RESULTS = "results"
 
@@ -31,6 +32,7 @@ wildcard_constraints:
     estimator="closed_form|network|searched",
     shard=r"\d+",
     worker=r"\d+",
+    block=r"\d+",
 
 
 def code(script):
@@ -48,11 +50,24 @@ def case_files(name):
     return [f"{RESULTS}/experiments/{case.path}/{name}" for case in PLAN.cases]
 
 
+def more(first):
+    """Megabytes or minutes of a job, doubled with every attempt after one that it took too much of."""
+    return lambda wildcards, attempt: first * 2 ** (attempt - 1)
+
+
 onstart:
     try:
         provenance.claim(RESULTS)
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
+
+
+onsuccess:
+    times.write(f"{RESULTS}/benchmarks")
+
+
+onerror:
+    times.write(f"{RESULTS}/benchmarks")
 
 
 # --- datasets and features ---
@@ -64,12 +79,29 @@ def dataset_spec(wildcards):
 
 def shards(case, part):
     """The files of one part of a case's dataset."""
-    number = case.config["sampling"]["shards"]
+    number = configuration.dataset_spec(case.config, part)["shards"]
     return [f"{RESULTS}/datasets/{case.datasets[part]}/{part}/shard_{shard}.nc" for shard in range(number)]
 
 
 def shards_of_part(wildcards):
     return shards(PLAN.case(wildcards.case), wildcards.part)
+
+
+def blocks_of_part(wildcards):
+    """The shards of a part in the blocks that jobs reconstruct, if there is more than one."""
+    files = shards_of_part(wildcards)
+    size = configuration.SHARDS_OF_A_BLOCK
+    return [files[n : n + size] for n in range(0, len(files), size)] if len(files) > size else []
+
+
+def shards_of_block(wildcards):
+    return blocks_of_part(wildcards)[int(wildcards.block)]
+
+
+def reconstructed_from(wildcards):
+    """The shards themselves, or what other jobs have reconstructed from blocks of them."""
+    stem = f"{RESULTS}/experiments/{wildcards.case}/features/{wildcards.part}_{wildcards.method}"
+    return [f"{stem}.{n}.nc" for n in range(len(blocks_of_part(wildcards)))] or shards_of_part(wildcards)
 
 
 def feature_tables(case, part):
@@ -123,8 +155,8 @@ def chosen_network(wildcards):
     return search_results(wildcards)[1:] if wildcards.estimator == "searched" else []
 
 
-def histories(wildcards):
-    """One file of every trained estimator of a case."""
+def estimators(wildcards):
+    """The folder of every trained estimator of a case."""
     search = composed(wildcards)["search"]
     searched = search["reconstruction"] if search["trials"] else None
     names = [
@@ -136,12 +168,12 @@ def histories(wildcards):
             *(["searched"] if method == searched else []),
         )
     ]
-    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}/history.json" for name in names]
+    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}" for name in names]
 
 
 def exported_network(wildcards):
     """The network worth embedding: the searched one, else that of the last method."""
-    networks = [path for path in histories(wildcards) if "closed_form" not in path]
+    networks = [path for path in estimators(wildcards) if "closed_form" not in path]
     return ([path for path in networks if "identifiers/paper" not in path] or networks)[-1:]
 
 
@@ -183,14 +215,31 @@ def title_and_question(wildcards):
 BENCH = str(config.get("bench", "")).rstrip("/")
 DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
 WITHHELD = f"{RESULTS}/withheld"
+BENCHES = str(config.get("benches", "")).rstrip("/")
+FLEET_NAME = configuration.bench_name(BENCHES)
+FLEET = f"{RESULTS}/fleets/{FLEET_NAME}"
 
 
 def bench_files(wildcards):
-    """The files of the bench."""
+    """The files of the bench; with a storage provider, copies of them."""
     try:
         return configuration.bench_files(BENCH)
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
+
+
+def batch_files(wildcards):
+    """The files of a batch of a fleet."""
+    return configuration.batch_files(configuration.batches(BENCHES)[int(wildcards.batch)])
+
+
+def fleet_batches(wildcards):
+    """One file of every batch of a fleet."""
+    try:
+        number = len(configuration.batches(BENCHES))
+    except InputError as error:
+        sys.exit(f"emafault: {one_line(error)}")
+    return [f"{FLEET}/batch_{n}.parquet" for n in range(number)]
 
 
 def withheld_measured(wildcards):

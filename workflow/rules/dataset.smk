@@ -7,9 +7,11 @@ rule compile_simulation:
         f"{RESULTS}/compiled.txt",
     log:
         f"{RESULTS}/logs/compile_simulation.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/compile_simulation.tsv"
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=more(2000),
+        runtime=more(10),
     params:
         spec=configuration.recursively_sorted(vars(configuration.reference_actuator())),
         code=code("simulate_shard"),
@@ -24,9 +26,11 @@ rule simulate_shard:
         f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
     log:
         f"{RESULTS}/logs/{{dataset}}/simulate_{{part}}_{{shard}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{dataset}}/simulate_{{part}}_{{shard}}.tsv"
     resources:
-        mem_mb=1000,
-        runtime=60,
+        mem_mb=more(1000),
+        runtime=more(20),
     params:
         spec=dataset_spec,
         code=code("simulate_shard"),

@@ -8,9 +8,11 @@ rule check_evidence:
         scores=f"{RESULTS}/evidence/scores.json",
     log:
         f"{RESULTS}/logs/evidence/check_evidence.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/evidence/check_evidence.tsv"
     resources:
-        mem_mb=1000,
-        runtime=20,
+        mem_mb=more(1000),
+        runtime=more(20),
     params:
         spec=lambda wildcards: configuration.evidence_spec(),
         code=code("check_evidence"),

@@ -14,13 +14,15 @@ rule diagnose_gap:
         report=f"{DIAGNOSIS}/report.html",
     log:
         f"{RESULTS}/logs/diagnoses/{configuration.bench_name(BENCH)}/diagnose_gap.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnoses/{configuration.bench_name(BENCH)}/diagnose_gap.tsv"
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=more(2000),
+        runtime=more(10),
         tracking=1,
     params:
-        bench=BENCH,
+        is_folder=os.path.isdir(BENCH),
         twin=str(config.get("twin", "actuator")),
         spec=configuration.diagnosis_spec(PLAN.cases[0].config),
         code=code("diagnose_gap"),
@@ -30,16 +32,19 @@ rule diagnose_gap:
 
 rule retrain_network:
     input:
+        files=bench_files,
         verdict=rules.diagnose_gap.output.verdict,
     output:
         f"{DIAGNOSIS}/retrained.json",
     log:
         f"{RESULTS}/logs/diagnoses/{configuration.bench_name(BENCH)}/retrain_network.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnoses/{configuration.bench_name(BENCH)}/retrain_network.tsv"
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=more(2000),
+        runtime=more(30),
     params:
-        bench=BENCH,
+        is_folder=os.path.isdir(BENCH),
         spec=configuration.retraining_spec(PLAN.cases[0].config),
         code=code("retrain_network"),
     script:

@@ -8,9 +8,11 @@ rule search_network:
         f"{CASE}/search/worker_{{worker}}.json",
     log:
         f"{RESULTS}/logs/{{case}}/search_{{worker}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/search_{{worker}}.tsv"
     resources:
-        mem_mb=2000,
-        runtime=240,
+        mem_mb=more(2000),
+        runtime=more(240),
     params:
         spec=search_spec,
         code=code("search_network"),
@@ -28,9 +30,11 @@ rule choose_network:
         chosen=f"{CASE}/search/chosen.json",
     log:
         f"{RESULTS}/logs/{{case}}/choose_network.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/choose_network.tsv"
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=more(2000),
+        runtime=more(10),
     params:
         spec=search_spec,
         code=code("choose_network"),
@@ -44,12 +48,14 @@ rule train_identifier:
         features=training_features,
         chosen=chosen_network,
     output:
-        f"{CASE}/identifiers/{{method}}/{{estimator}}/history.json",
+        directory(f"{CASE}/identifiers/{{method}}/{{estimator}}"),
     log:
         f"{RESULTS}/logs/{{case}}/train_{{method}}_{{estimator}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/train_{{method}}_{{estimator}}.tsv"
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=more(2000),
+        runtime=more(30),
     params:
         spec=training_spec,
         code=code("train_identifier"),
@@ -60,15 +66,18 @@ rule train_identifier:
 rule export_network:
     input:
         features=exported_features,
-        history=exported_network,
+        network=exported_network,
     output:
         model=f"{CASE}/export/network.onnx",
+        source=f"{CASE}/export/network.c",
         check=f"{CASE}/export/check.json",
     log:
         f"{RESULTS}/logs/{{case}}/export_network.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/export_network.tsv"
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=more(2000),
+        runtime=more(10),
     params:
         code=code("export_network"),
     script:
@@ -77,7 +86,7 @@ rule export_network:
 
 rule evaluate_identification:
     input:
-        histories=histories,
+        estimators=estimators,
         fresh=fresh_features,
         references=reference_features,
         bound=rules.compute_bound.output,
@@ -86,9 +95,11 @@ rule evaluate_identification:
         estimates=f"{CASE}/evaluation/estimates.nc",
     log:
         f"{RESULTS}/logs/{{case}}/evaluate_identification.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/evaluate_identification.tsv"
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=more(2000),
+        runtime=more(30),
     params:
         spec=evaluation_spec,
         code=code("evaluate_identification"),

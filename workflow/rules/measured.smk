@@ -18,9 +18,11 @@ rule diagnose_machines:
         withheld=f"{RESULTS}/measured/withheld.json",
     log:
         f"{RESULTS}/logs/measured/diagnose_machines.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/measured/diagnose_machines.tsv"
     resources:
-        mem_mb=1000,
-        runtime=20,
+        mem_mb=more(1000),
+        runtime=more(20),
     params:
         code=code("diagnose_machines"),
     script:

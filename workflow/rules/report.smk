@@ -6,6 +6,8 @@ rule write_configuration:
         f"{CASE}/configuration.yaml",
     log:
         f"{RESULTS}/logs/{{case}}/write_configuration.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/write_configuration.tsv"
     localrule: True
     params:
         spec=whole_configuration,
@@ -21,9 +23,11 @@ rule simulate_examples:
         f"{CASE}/examples.nc",
     log:
         f"{RESULTS}/logs/{{case}}/simulate_examples.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/simulate_examples.tsv"
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=more(1000),
+        runtime=more(10),
     params:
         spec=examples_spec,
         code=code("simulate_examples"),
@@ -35,7 +39,7 @@ rule draw_report:
     input:
         metrics=rules.evaluate_identification.output.metrics,
         estimates=rules.evaluate_identification.output.estimates,
-        histories=histories,
+        estimators=estimators,
         examples=rules.simulate_examples.output,
         search=search_results,
         configuration=rules.write_configuration.output,
@@ -44,9 +48,11 @@ rule draw_report:
         figures=directory(f"{CASE}/figures"),
     log:
         f"{RESULTS}/logs/{{case}}/draw_report.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/draw_report.tsv"
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=more(2000),
+        runtime=more(10),
     params:
         spec=title_and_question,
         code=code("draw_report"),
@@ -64,9 +70,11 @@ if PLAN.is_study:
             figures=directory(f"{EXPERIMENT}/figures"),
         log:
             f"{RESULTS}/logs/{PLAN.name}/compare_variants.log",
+        benchmark:
+            f"{RESULTS}/benchmarks/{PLAN.name}/compare_variants.tsv"
         resources:
-            mem_mb=1000,
-            runtime=10,
+            mem_mb=more(1000),
+            runtime=more(10),
         params:
             spec={
                 "title": PLAN.name,
@@ -84,11 +92,13 @@ rule prepare_tracking:
         f"{RESULTS}/tracking.json",
     log:
         f"{RESULTS}/logs/prepare_tracking.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/prepare_tracking.tsv"
     localrule: True
     resources:
         tracking=1,
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=more(1000),
+        runtime=more(10),
     params:
         spec=configuration.recursively_sorted(PLAN.cases[0].config["tracking"]),
         code=code("prepare_tracking"),
@@ -100,9 +110,10 @@ rule track_evaluation:
     input:
         where=rules.prepare_tracking.output,
         metrics=rules.evaluate_identification.output.metrics,
-        histories=histories,
+        estimators=estimators,
         search=search_results,
         model=rules.export_network.output.model,
+        source=rules.export_network.output.source,
         report=rules.draw_report.output.report,
         figures=rules.draw_report.output.figures,
         configuration=rules.write_configuration.output,
@@ -110,11 +121,13 @@ rule track_evaluation:
         f"{CASE}/tracked.json",
     log:
         f"{RESULTS}/logs/{{case}}/track_evaluation.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/track_evaluation.tsv"
     localrule: True
     resources:
         tracking=1,
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=more(1000),
+        runtime=more(10),
     params:
         spec=whole_configuration,
         code=code("track_evaluation"),

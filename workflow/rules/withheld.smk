@@ -8,13 +8,17 @@ wildcard_constraints:
 
 
 rule diagnose_cases:
+    input:
+        rules.compile_simulation.output,
     output:
         f"{WITHHELD}/{{draw}}/{{rung}}_{{batch}}.json",
     log:
         f"{RESULTS}/logs/withheld/{{draw}}/{{rung}}_{{batch}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/withheld/{{draw}}/{{rung}}_{{batch}}.tsv"
     resources:
-        mem_mb=2000,
-        runtime=240,
+        mem_mb=more(2000),
+        runtime=more(240),
     params:
         spec=lambda wildcards: configuration.withheld_spec(wildcards.draw, wildcards.rung, int(wildcards.batch)),
         code=code("diagnose_cases"),
@@ -32,10 +36,12 @@ rule score_cases:
         scores=f"{WITHHELD}/{{draw}}/scores.json",
     log:
         f"{RESULTS}/logs/withheld/{{draw}}/score_cases.log",
-    threads: 8
+    benchmark:
+        f"{RESULTS}/benchmarks/withheld/{{draw}}/score_cases.tsv"
+    threads: 2
     resources:
-        mem_mb=2000,
-        runtime=20,
+        mem_mb=more(2000),
+        runtime=more(20),
         tracking=1,
     params:
         code=code("score_cases"),

@@ -9,7 +9,9 @@ from emafault.progress import one_line_errors
 with one_line_errors(snakemake.log[0]):
     params = snakemake.params
     out = Path(snakemake.output.verdict).parent
+    bench = Path(snakemake.input.files[0])
+    bench = bench.parent if params.is_folder else bench
     if params.twin == "actuator":
-        diagnose_folder(params.bench, params.spec, out)
+        diagnose_folder(bench, params.spec, out)
     else:
-        diagnose_file(params.bench, params.twin, params.spec, out)
+        diagnose_file(bench, params.twin, params.spec, out)

@@ -1,6 +1,7 @@
 """Draw the report of one experiment."""
 
 from emafault.progress import one_line_errors
+from emafault.study.networks import histories_in
 from emafault.study.report import draw_report
 
 with one_line_errors(snakemake.log[0]):
@@ -10,7 +11,7 @@ with one_line_errors(snakemake.log[0]):
         spec["question"],
         given.metrics,
         given.estimates,
-        given.histories,
+        histories_in(given.estimators),
         given.examples[0],
         given.search,
         given.configuration[0],

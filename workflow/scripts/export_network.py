@@ -1,4 +1,4 @@
-"""Export a trained network to ONNX."""
+"""Export a trained network to ONNX and to C99."""
 
 from pathlib import Path
 
@@ -6,5 +6,6 @@ from emafault.progress import one_line_errors
 from emafault.study.networks import export_network
 
 with one_line_errors(snakemake.log[0]):
-    folder = Path(snakemake.input.history[0]).parent
-    export_network(folder, snakemake.input.features, snakemake.output.model, snakemake.output.check)
+    folder = Path(snakemake.input.network[0])
+    out = snakemake.output
+    export_network(folder, snakemake.input.features, out.model, out.source, out.check)

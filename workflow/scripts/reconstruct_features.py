@@ -1,7 +1,11 @@
-"""Reconstruct every run of a part of a dataset by one method."""
+"""Reconstruct the runs of a part, or of a block of its shards, by one method; or join its blocks."""
 
 from emafault.progress import one_line_errors
-from emafault.study.features import reconstruct_features
+from emafault.study.features import join_features, reconstruct_features
 
 with one_line_errors(snakemake.log[0]):
-    reconstruct_features(list(snakemake.input), snakemake.params.spec, snakemake.output[0])
+    params = snakemake.params
+    if params.get("joined"):
+        join_features(list(snakemake.input), snakemake.output[0])
+    else:
+        reconstruct_features(list(snakemake.input), params.spec, snakemake.output[0])

@@ -1,16 +1,20 @@
 """A method of a shared object called in forked processes, which share what has been read without a copy."""
 
 import multiprocessing
+import os
 import weakref
 from collections.abc import Sequence
 from typing import Any
 
+from ..processes import end_with
+
 _shared: Any = None
 
 
-def _begin(shared: object) -> None:
+def _begin(shared: object, parent: int) -> None:
     global _shared
     _shared = shared
+    end_with(parent)
 
 
 def _done(call: tuple[str, tuple]):
@@ -31,7 +35,7 @@ class Workers:
         self.pools: list = []
         if processes > 1 and "fork" in multiprocessing.get_all_start_methods():
             context = multiprocessing.get_context("fork")
-            self.pools = [context.Pool(1, _begin, (shared,)) for _ in range(processes)]
+            self.pools = [context.Pool(1, _begin, (shared, os.getpid())) for _ in range(processes)]
             for pool in self.pools:
                 weakref.finalize(owner, pool.terminate)
 

@@ -84,9 +84,10 @@ def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path 
     verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
     text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
-    write_text(folder / VERDICT, checked(verdict))
+    last = checked(verdict)
+    truths = {n: r.fault for n, r in bench.recordings.items()}
+    draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)
-    truths = {n: r.fault for n, r in bench.recordings.items()}
-    draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
+    write_text(folder / VERDICT, last)  # the last of them: where a verdict is, its report is

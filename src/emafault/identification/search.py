@@ -1,29 +1,33 @@
 """Search over network size and training with Optuna: two objectives, several workers on one storage, resumable.
 
-Given the seed, one worker from an empty storage proposes the same trials each time; with several workers, or after
-a kill, what a sampler has seen depends on which trial ended first, so that repetition is best effort. A trial's own
-result does not: it depends on its settings and the seed alone.
+Given the seed, one worker from an empty storage proposes the same trials each time, killed and resumed or not; with
+several workers what a sampler has seen depends on which trial ended first, so that repetition is best effort. A trial's
+own result does not: it depends on its settings and the seed alone.
 """
 
+import contextlib
 import hashlib
 import json
 import os
-import socket
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..databases import SQLITE, locked, with_driver, without_password
 from ..errors import InputError
+from ..processes import still_there, this_process
 from .settings import NetworkSettings, TrainingSettings
 from .training import train
 
-#: a trial of another host counts as abandoned after this long (s); on this host its process is asked for
-ABANDONED_AFTER = 600.0
+#: how often the owner of a trial shows that it is alive, and after how long without that a worker of another host
+#: counts the trial as abandoned (s, by the clock of who waits); on the owner's host its process is asked for
+HEARTBEAT, ABANDONED_AFTER = 10.0, 60.0
+_LOCKED_FOR = 60.0  # s that SQLite waits for another process
 _JOURNAL_HEAD = b'{"op_code":'
 SAMPLERS = ("tpe", "nsga2")
 #: proposals of settings already tried that are refused in a row before one is taken, as it must be in a small space
@@ -131,36 +135,51 @@ def open_study(storage: str | Path, name: str, sampler: Any = None):
     from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    if "://" in str(storage):
-        target: Any = str(storage)
-    else:
-        path = Path(storage).resolve()  # the lock misbehaves on relative paths
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            # an open lock, since the symbolic one judges its age by the journal's; writes take milliseconds
-            lock = JournalFileOpenLock(str(path), grace_period=10)
-            _mend(path, lock)
-            target = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))
-        except (ValueError, LookupError, TypeError, AssertionError) as error:  # whatever reading other lines leads to
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: {_garbage(path)}; cut it off there, or name another file") from error
-        except OSError as error:
-            raise InputError(f"{path}: the search cannot be stored ({error.strerror or error})") from error
+    address = str(storage)
+    if "://" in address:
+        return _database_study(address, name, sampler)
+    path = Path(storage).resolve()  # the lock misbehaves on relative paths
     try:
-        return optuna.create_study(
-            storage=target,
-            study_name=name,
-            directions=["minimize", "minimize"],
-            sampler=sampler,
-            load_if_exists=True,
-        )
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # an open lock, since the symbolic one judges its age by the journal's; writes take milliseconds
+        lock = JournalFileOpenLock(str(path), grace_period=10)
+        _mend(path, lock)
+        target = JournalStorage(JournalFileBackend(str(path), lock_obj=lock))
+        return _study(target, name, sampler)
+    except (ValueError, LookupError, TypeError, AssertionError) as error:  # whatever reading other lines leads to
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: {_garbage(path)}; cut it off there, or name another file") from error
+    except OSError as error:
+        raise InputError(f"{path}: the search cannot be stored ({error.strerror or error})") from error
+
+
+def _database_study(address: str, name: str, sampler: Any):
+    from optuna.storages import RDBStorage
+
+    waits = {"connect_args": {"timeout": _LOCKED_FOR}} if address.startswith(SQLITE) else {"pool_pre_ping": True}
+    try:
+        with locked(address):  # tables and the study are created by one process at a time
+            return _study(RDBStorage(with_driver(address), engine_kwargs=waits), name, sampler)
     except (ValueError, OSError, ImportError) as error:
-        raise InputError(f"{storage}: not a usable search storage ({error})") from error
+        raise InputError(f"{without_password(address)}: not a usable search storage ({error})") from error
     except Exception as error:  # what a database driver raises depends on the database
         if type(error).__module__.split(".")[0] not in ("sqlalchemy", "optuna"):
             raise
-        raise InputError(f"{storage}: not a usable search storage ({str(error).splitlines()[0]})") from error
+        reason = str(error).splitlines()[0]
+        raise InputError(f"{without_password(address)}: not a usable search storage ({reason})") from error
+
+
+def _study(storage: Any, name: str, sampler: Any):
+    import optuna
+
+    return optuna.create_study(
+        storage=storage,
+        study_name=name,
+        directions=["minimize", "minimize"],
+        sampler=sampler,
+        load_if_exists=True,
+    )
 
 
 def _garbage(path: Path) -> str:
@@ -193,38 +212,66 @@ def _mend(path: Path, lock) -> None:
             lock.release()
 
 
-def _process(pid: int) -> str | None:
-    """What tells a process from a later one of the same number, its start where the system shows it; None if gone."""
+class _Watch:
+    """Which running trials of a study were abandoned by their owners, as this worker sees it."""
+
+    def __init__(self) -> None:
+        self._seen: dict[int, tuple[Any, float]] = {}  # trial -> last beat and when it was first seen here
+
+    def bury_abandoned(self, study) -> None:
+        """Tell trials failed whose owners are gone."""
+        from optuna.trial import TrialState
+
+        for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+            if self._abandoned(trial):
+                _tell(study, trial.number, state=TrialState.FAIL)
+
+    def _abandoned(self, trial) -> bool:
+        owner, beat = trial.user_attrs.get("owner"), trial.user_attrs.get("beat")
+        if owner is not None:  # one worker runs its trials one after the other, and asks between two of them
+            there = still_there(owner) and owner != this_process()
+            if there is not None:
+                return not there
+        last, since = self._seen.get(trial.number, (None, 0.0))
+        if trial.number not in self._seen or last != beat:
+            self._seen[trial.number] = beat, time.monotonic()
+            return False
+        # one without an owner was killed between asking for the trial and signing it
+        return time.monotonic() - since > (10.0 if owner is None else ABANDONED_AFTER)
+
+
+def _tell(study, trial, *values, **more) -> bool:
+    """Tell a trial's end; False where another worker was first, by whom it was taken for abandoned."""
     try:
-        os.kill(pid, 0)
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
-    except ProcessLookupError:
-        return None
-    except OSError:
-        return "alive"
+        study.tell(trial, *values, **more)
+    except (ValueError, RuntimeError, LookupError) as error:
+        from optuna.exceptions import StorageInternalError
+
+        if isinstance(error, StorageInternalError):
+            raise
+        return False
+    return True
 
 
-def _running(trial) -> bool:
-    """Whether another process still runs a trial; one worker runs its trials one after the other."""
-    owner = trial.user_attrs.get("owner")
-    age = (datetime.now() - trial.datetime_start).total_seconds() if trial.datetime_start else 0.0
-    if owner is None:  # killed between asking for the trial and signing it
-        return age < 10.0
-    host, pid, process = owner
-    if host == socket.gethostname():
-        return pid != os.getpid() and _process(pid) == process
-    return age < ABANDONED_AFTER
+@contextlib.contextmanager
+def _beating(trial) -> Iterator[None]:
+    """Show to workers of other hosts that this trial is being worked on."""
+    done = threading.Event()
 
+    def beat() -> None:
+        count = 0
+        while not done.wait(HEARTBEAT):
+            count += 1
+            with contextlib.suppress(Exception):  # told abandoned meanwhile, or a storage that is not reached now
+                trial.set_user_attr("beat", count)
 
-def _bury_abandoned(study) -> None:
-    from optuna.trial import TrialState
-
-    for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        if not _running(trial):
-            try:
-                study.tell(trial.number, state=TrialState.FAIL)
-            except (ValueError, RuntimeError):  # another worker was first
-                pass
+    thread = threading.Thread(target=beat, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
 
 
 def trial_error(
@@ -265,20 +312,12 @@ def run_worker(
     -------
     number of trials that this worker ran
     """
-    import optuna
     from optuna.trial import TrialState
 
-    name = study_name(settings, features, faults, width)
-    study = open_study(storage, name)
-    seen = len(study.get_trials(deepcopy=False))  # a resumed worker must not propose again what it did
-    seed = int(np.random.SeedSequence([settings.seed, worker, seen]).generate_state(1)[0])
-    if settings.sampler == "tpe":
-        study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True, multivariate=True)
-    else:
-        study.sampler = optuna.samplers.NSGAIISampler(seed=seed, population_size=max(4, min(20, settings.trials // 3)))
-    done_here, repeated = 0, 0
+    study = open_study(storage, study_name(settings, features, faults, width))
+    watch, done_here, repeated = _Watch(), 0, 0
     while True:
-        _bury_abandoned(study)
+        watch.bury_abandoned(study)
         trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.RUNNING))
         complete = sum(t.state == TrialState.COMPLETE for t in trials)
         if progress:
@@ -288,18 +327,30 @@ def run_worker(
         if len(trials) >= settings.trials:
             time.sleep(0.2)  # the last ones run elsewhere; should that worker die, they are run here
             continue
+        study.sampler = _sampler(settings, worker, complete, repeated)
         trial = study.ask()
-        trial.set_user_attr("owner", [socket.gethostname(), os.getpid(), _process(os.getpid())])
+        trial.set_user_attr("owner", this_process())
         values = {key: _suggest(trial, key, spec) for key, spec in sorted(settings.space.items())}
         twin = next((t for t in trials if t.params == values), None)
         if twin is not None and repeated < _REPEATS:
-            study.tell(trial, state=TrialState.FAIL)  # samplers pass over these, and they do not count
+            _tell(study, trial, state=TrialState.FAIL)  # samplers pass over these, and they do not count
             repeated += 1
             continue
         repeated = 0
         known = twin.values if twin is not None and twin.state == TrialState.COMPLETE else None
-        study.tell(trial, known or trial_error(settings, values, features, faults, width))
-        done_here += 1
+        with _beating(trial):
+            found = known or trial_error(settings, values, features, faults, width)
+        done_here += _tell(study, trial, found)
+
+
+def _sampler(settings: SearchSettings, worker: int, complete: int, repeated: int):
+    """A sampler seeded by how far the search has come, so that one that was killed goes on as it would have."""
+    import optuna
+
+    seed = int(np.random.SeedSequence([settings.seed, worker, complete, repeated]).generate_state(1)[0])
+    if settings.sampler == "tpe":
+        return optuna.samplers.TPESampler(seed=seed, constant_liar=True, multivariate=True)
+    return optuna.samplers.NSGAIISampler(seed=seed, population_size=max(4, min(20, settings.trials // 3)))
 
 
 def summarise(

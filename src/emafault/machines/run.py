@@ -59,16 +59,16 @@ def diagnose_file(
         found[case] = diagnose(one)
         said = finding(found[case].verdict)
         print("\n".join([f"{shown(case)}:", *said] if len(cases) > 1 else said), flush=True)
-        write_text(folders[case] / VERDICT, checked(found[case].verdict))
+        last = checked(found[case].verdict)
+        draw(found[case]).write(folders[case] / REPORT)
+        write_text(folders[case] / VERDICT, last)  # the last of them: where a verdict is, its report is
     if len(cases) > 1:
         together = {c: json.loads(to_json(d.verdict)) for c, d in found.items()}
-        write_text(folder / VERDICT, to_json({"bench": name, "twin": machine.name, "cases": together}))
         contents = Page(f"Diagnoses of {name}")
         links = "".join(f'<li><a href="{folders[c].name}/{REPORT}">{html.escape(c)}</a></li>' for c in cases)
         contents.parts.append(f"<ul>{links}</ul>")
         contents.write(folder / REPORT)
-    for case, diagnosed in found.items():
-        draw(diagnosed).write(folders[case] / REPORT)
+        write_text(folder / VERDICT, to_json({"bench": name, "twin": machine.name, "cases": together}))
     print(f"written to {folder}", flush=True)
     for case, diagnosed in found.items() if track else ():
         log_diagnosis(spec["tracking"], folders[case], diagnosed.verdict)

@@ -17,6 +17,7 @@ from ..errors import InputError, shown
 from ..paths import results_folder
 from ..places import refuse_folder, refuse_irregular, refuse_output
 from ..plain import read_json
+from ..processes import end_with
 from ..progress import say
 
 VERDICT, REPORT, EXPERIMENT = "diagnosis.json", "report.html", "experiment.yaml"
@@ -119,7 +120,7 @@ def aside(track: bool) -> Iterator[Callable[..., None]]:
     if "fork" not in get_all_start_methods():
         yield log_diagnosis
         return
-    with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(1, get_context("fork"), end_with, (os.getpid(),)) as pool:
         pool.submit(import_module, "mlflow")  # what comes of it shows below
         yield lambda *arguments: _say_if_not(_awaited(pool.submit(_failure, *arguments)))
 

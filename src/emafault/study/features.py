@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
 from ..io.recording import PHASES
+from ..places import file_at
 from ..progress import progress
 from ..reconstruction import Features, reconstruct
 
@@ -97,6 +98,50 @@ def write_features(path: str | Path, tables: Iterable[FeatureTable], runs: int) 
                 first += len(table.faults)
 
     replace_atomically(Path(path), write)
+
+
+def join_features(paths: Sequence[str | Path], output: str | Path) -> None:
+    """Write files of features as one, one after the other; the runs of one of them are in memory at a time.
+
+    Raises
+    ------
+    InputError : a file that cannot be read or written
+    """
+    import netCDF4
+
+    def write(temporary: Path) -> None:
+        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as joined:
+            first = 0
+            for path in paths:
+                with netCDF4.Dataset(file_at(path)) as part:
+                    part.set_auto_mask(False)
+                    if not first:
+                        _create_like(joined, part, sum(_runs_in(p) for p in paths))
+                    for name, variable in part.variables.items():
+                        if variable.dimensions[0] == "run":
+                            joined[name][first : first + len(variable)] = variable[:]
+                    first += len(part.dimensions["run"])
+
+    replace_atomically(Path(output), write)
+
+
+def _runs_in(path: str | Path) -> int:
+    import netCDF4
+
+    with netCDF4.Dataset(path) as file:
+        return len(file.dimensions["run"])
+
+
+def _create_like(joined, part, runs: int) -> None:
+    """The dimensions, variables and attributes of a file of features, with so many runs."""
+    joined.setncatts({key: part.getncattr(key) for key in part.ncattrs()})
+    for name, dimension in part.dimensions.items():
+        joined.createDimension(name, runs if name == "run" else len(dimension))
+    for name, variable in part.variables.items():
+        made = joined.createVariable(name, variable.dtype, variable.dimensions, fill_value=False)
+        made.setncatts({key: variable.getncattr(key) for key in variable.ncattrs()})
+        if variable.dimensions[0] != "run":
+            made[:] = variable[:]
 
 
 def _variables(table: FeatureTable) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:

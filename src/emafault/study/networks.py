@@ -137,20 +137,29 @@ def choose_network(features: str, spec: Mapping[str, Any], storage: str, trials:
     write_json(chosen, asdict(choose(found, spec["search"]["tolerance"])))
 
 
-def export_network(folder: str | Path, features: str, model: str, check: str) -> None:
-    """Export a trained network (its first seed) to ONNX and check it against torch on given features.
+def export_network(folder: str | Path, features: str, model: str, source: str, check: str) -> None:
+    """Export a trained network (its first seed) to ONNX, checked against torch on given features, and to C99.
+
+    ``check`` gets the differences, and what one identification by the C99 takes.
 
     Raises
     ------
     InputError : a folder without a network, or a file that cannot be written
     """
+    from ..identification.c99 import write_c
     from ..identification.export import export_onnx
     from ..identification.identifier import Identifier
 
     network = Identifier.load(seed_folder(folder, 0)).network
     if network is None:
         raise InputError(f"{folder}: holds no network to export")
-    write_json(check, export_onnx(network, model, read_features(features).identified().inputs))
+    taken = write_c(network, source)
+    write_json(check, export_onnx(network, model, read_features(features).identified().inputs) | {"c99": taken})
+
+
+def histories_in(estimators: Sequence[str]) -> list[str]:
+    """History files of folders of estimators."""
+    return [f"{folder}/{HISTORY}" for folder in estimators]
 
 
 def folders(histories: Sequence[str]) -> list[Path]:
