@@ -32,17 +32,13 @@ def residual(state: State) -> Dual:
     lead = 0.5 * a.control_period
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
-    model = position.shaft_angle(state)
-    output = model + (rec.output - model).linear(lambda x: _averaged(x, h), rec.size)
+    shaft = position.shaft_angle(state)
+    output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
     seen = model + _averaged(rec.speed_recorded - model, h)
-    wanted = p("controller.position_gain") * (
-        a.gear_ratio
-        * (
-            rec.once(("commanded",), lambda: _commanded(rec, lead))
-            - output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
-        )
-    )
+    commanded = rec.once(("commanded",), lambda: _commanded(rec, lead))
+    at_ticks = output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
+    wanted = p("controller.position_gain") * (a.gear_ratio * (commanded - at_ticks))
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
     error = asked - _centred(seen, h, lead)
