@@ -4,12 +4,14 @@ import argparse
 import sys
 
 from ..errors import shown
+from .machine import add_actuator
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("files", nargs="+", metavar="FILE_OR_FOLDER", help="recordings, or folders of them (*.nc)")
     parser.add_argument("--experiment", default="paper", metavar="NAME", help="trained experiment to use (paper)")
+    add_actuator(parser)
     parser.add_argument("--json", metavar="OUT", help="file to write the estimates to")
     parser.add_argument(
         "--reference",
@@ -46,7 +48,7 @@ def run(args: argparse.Namespace) -> None:
     paths, healthy = recordings_in(args.files), recordings_in(args.reference)
     if args.json is not None:
         refuse_output(args.json, "--json", read=[*paths, *healthy], force=args.force)
-    model = load_model(args.experiment, args.method, args.results)
+    model = load_model(args.experiment, args.method, args.results, args.actuator)
     reference = [read_recording(path) for path in healthy]
     found = identify_recordings(model, [read_recording(path) for path in paths], reference, args.level)
     result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}

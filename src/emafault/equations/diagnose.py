@@ -20,6 +20,7 @@ from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
 from ..effects import EFFECTS
+from ..effects.scaling import scaled
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
@@ -79,6 +80,7 @@ def diagnose(
     noise: SensorNoise,
     exclude: Sequence[str] = (),
     processes: int = 1,
+    tolerances: Mapping[str, Mapping[str, float]] | None = None,
 ) -> "Diagnosed":
     """Diagnose a bench: its verdict, in the format of ``diagnosis.json``, and the fit that it rests on.
 
@@ -89,6 +91,7 @@ def diagnose(
     noise : of the sensors, where the recordings do not tell it
     exclude : effects that the library is to lack
     processes : in which recordings are linearised side by side
+    tolerances : of this actuator, see ``effects.scaling.scaled``
 
     Raises
     ------
@@ -99,7 +102,8 @@ def diagnose(
             raise InputError(f"exclude: '{effect}' is not an effect, accepted are {', '.join(EFFECTS)}")
     explore, confirm = split
     own = estimated_noise([recordings[n] for n in explore], noise)
-    machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, exclude)
+    library = exclude, scaled(actuator, tolerances)
+    machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, *library)
     bench = Bench(machine, list(explore), processes)
     first = _spread(recordings, explore)
     if len(first) < len(explore):
@@ -119,7 +123,7 @@ def diagnose(
     # from here on the confirm recordings are open
     known = machine.recordings
     signals = {n: known[n] if n in known else Signals.of(n, r, actuator, own) for n, r in recordings.items()}
-    whole = ReferenceActuator(actuator, signals, exclude)
+    whole = ReferenceActuator(actuator, signals, *library)
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
     units, observed = all_fit.search.units.values(), tuple(whole.observed())

@@ -35,7 +35,7 @@ def diagnose_folder(
 
     Parameters
     ----------
-    spec : ``actuator``, ``sensors`` and ``tracking`` of a composed configuration
+    spec : ``actuator``, ``tolerances``, ``sensors`` and ``tracking`` of a composed configuration
     out : folder to write to; None takes ``results/diagnoses/<name of the bench>``
     exclude : effects that the library is to lack
     experiment : file that receives the fix as an experiment, besides the one among the results
@@ -74,7 +74,8 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     actuator = ActuatorParameters(**spec["actuator"])
     bench = read_bench(path, actuator)
     split = split_bench(bench.recordings)
-    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
+    noise, tolerances = SensorNoise(**spec["sensors"]), spec["tolerances"]
+    found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, tolerances)
     found.verdict["warnings"] = bench.warnings
     print("\n".join(finding(found.verdict)), flush=True)
     return bench, found

@@ -8,6 +8,7 @@ import numpy as np
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
+from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 
 SLOWEST_INTERVAL = 1e-3  # s
@@ -38,6 +39,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     ------
     InputError : naming the file, the variable and what contradicts it
     """
+    refuse_other_actuator(path, recording, actuator)
     ambient = recording.ambient_temperature
     if not TEMPERATURES[0] <= ambient <= TEMPERATURES[1]:
         low, high = TEMPERATURES
@@ -46,6 +48,8 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         dead = np.flatnonzero(np.ptp(getattr(recording, variable), axis=0) == 0.0)
         if len(dead):
             raise InputError(f"{path}: {variable} of phase {PHASES[dead[0]]} never changes; the channel is dead")
+    refuse_frozen(path, recording, actuator)
+    refuse_bus(path, recording, actuator)
     theta = recording.rotor_angle - recording.rotor_angle[0]
     travel = float(np.ptp(theta))
     if travel > 1.0:
@@ -70,7 +74,12 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         if order is not None and order != (0, 1, 2):
             raise InputError(f"{path}: phase_current_end has its phases in another order than phase_current")
     if travel * actuator.pole_pairs > 4 * np.pi:
+        whole = not any(clipped(recording))  # what is cut off says nothing of units
+        if whole:
+            refuse_unbalanced(path, recording)
         _refuse_swapped_phases(path, recording, actuator)
+        if whole:
+            refuse_implausible(path, recording, actuator)
 
 
 def _follows(wanted: np.ndarray, got: np.ndarray) -> tuple[bool, float, float]:

@@ -2,14 +2,16 @@
 
 import numpy as np
 
+from ...effects.scaling import scale
 from ..flexible import flexible_shaft
 
 SENTENCE = "the transmission is flexible"
 PARAMETERS = {"flexibility": (0.0, 1.5e-4, 1.2e-4), "C": (300.0, 300.0, 60.0)}
+SCALES = {"flexibility": "shaft_flexibility", "C": "shaft_torque"}
 SHAPES = ({"flexibility": 6e-5, "C": 300.0}, {"flexibility": 1.3e-4, "C": 300.0}, {"flexibility": 3e-4, "C": 300.0})
 GROUND = 2.0  # N m s/rad from the user shaft to ground
 SHARE = 0.3  # of the inertia behind the stiffness
-STIFFEST = 2e-5  # rad/(N m)
+STIFFEST = 2e-5  # rad/(N m), of the reference actuator
 KEPT = 12  # solutions of a recording
 
 
@@ -19,7 +21,7 @@ def solve(rec, flexibility, damping, play, scale):
     ``scale`` of this unit's inertia, which the user shaft has its share of.
     """
     a = rec.actuator
-    if flexibility < STIFFEST:
+    if flexibility < _stiffest(rec):
         return None
     J = SHARE * scale * a.inertia * a.gear_ratio**2
     position, torque = flexible_shaft(
@@ -28,9 +30,14 @@ def solve(rec, flexibility, damping, play, scale):
     return position, torque / a.gear_ratio
 
 
-def rotor_share(p):
+def _stiffest(rec):
+    """Flexibility (rad/(N m)) below which the shaft is taken for rigid."""
+    return scale("shaft_flexibility", rec.actuator) * STIFFEST
+
+
+def rotor_share(p, rec):
     """Share of the inertia that turns with the rotor."""
-    return 1.0 - SHARE if p("flexibility").value >= STIFFEST else 1.0
+    return 1.0 - SHARE if p("flexibility").value >= _stiffest(rec) else 1.0
 
 
 def twist(p, rec, rigid, play):
