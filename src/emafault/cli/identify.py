@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from ..errors import shown
 from .machine import add_actuator
@@ -24,6 +25,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         metavar="RECONSTRUCTION[/ESTIMATOR]",
         help="such as weighted/network or paper/closed_form; the most accurate of the experiment unless given",
+    )
+    parser.add_argument(
+        "--diagnosis",
+        metavar="VERDICT",
+        help="diagnosis.json of their bench: the fault vectors with the effects taken out that it names and describes",
     )
     parser.add_argument("--level", type=float, default=0.9, help="of the intervals (0.9)")
     parser.add_argument("--force", action="store_true", help="replace the file of --json if it exists")
@@ -48,6 +54,9 @@ def run(args: argparse.Namespace) -> None:
     paths, healthy = recordings_in(args.files), recordings_in(args.reference)
     if args.json is not None:
         refuse_output(args.json, "--json", read=[*paths, *healthy], force=args.force)
+    if args.diagnosis is not None:
+        _of_diagnosis(args, paths)
+        return
     model = load_model(args.experiment, args.method, args.results, args.actuator)
     reference = [read_recording(path) for path in healthy]
     found = identify_recordings(model, [read_recording(path) for path in paths], reference, args.level)
@@ -58,6 +67,31 @@ def run(args: argparse.Namespace) -> None:
     for path, note in zip(paths, found.notes):
         if note:
             print(f"{shown(path)}: {note}", file=sys.stderr)
+    if args.json is not None:
+        write_text(args.json, json.dumps(result, indent=1) + "\n")
+
+
+def _of_diagnosis(args: argparse.Namespace, paths: list[Path]) -> None:
+    """Print, and write, what a diagnosis has of these recordings.
+
+    Raises
+    ------
+    InputError : options that a diagnosis does not take, or a verdict that is not of these recordings
+    """
+    import json
+
+    from ..errors import InputError
+    from ..identification.diagnosed import of_verdict
+    from ..io.atomic import write_text
+
+    for option in ("reference", "method", "actuator"):
+        if getattr(args, option):
+            raise InputError(f"--{option}: is that of the diagnosis where --diagnosis is given")
+    found = of_verdict(args.diagnosis, paths, args.level)
+    result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
+    print(table(result, args.level))
+    taken_out = ", ".join(found.taken_out) or "nothing"
+    print(f"diagnosis {args.diagnosis}, taken out: {taken_out}, the unit's tolerances fitted")
     if args.json is not None:
         write_text(args.json, json.dumps(result, indent=1) + "\n")
 

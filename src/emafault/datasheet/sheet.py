@@ -66,11 +66,14 @@ def _sheet(path: str, content: Mapping[str, Any]) -> Sheet:
     for key in content:
         if key not in KEYS and key != "name":
             raise InputError(schema.unknown_key(key, "the file", ["name", *KEYS]))
+    for key in REQUIRED:
+        if key not in content:
+            raise InputError(f"{key}: is missing, {_wanted(key)} is needed")
     _validate(content)
     numbers = {key: _number(key, given) for key, given in content.items() if key in KEYS and not _unknown(given)}
     for key in REQUIRED:
         if key not in numbers:
-            raise InputError(f"{key}: is {'unknown' if key in content else 'missing'}, {_wanted(key)} is needed")
+            raise InputError(f"{key}: is unknown, {_wanted(key)} is needed")
     if not any(key in numbers for key in CONSTANTS):
         raise InputError(f"{CONSTANTS[0]}: is missing, and so are {' and '.join(CONSTANTS[1:])}; one of them is needed")
     return Sheet(path, str(content.get("name", Path(path).stem)), numbers)

@@ -9,8 +9,9 @@ from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
 from ..io.bench import Bench, bench_name, new_folder, read_bench
 from ..io.split import split_bench
-from ..paths import results_folder
+from ..paths import CONF, results_folder
 from ..places import file_name
+from ..plain import read_yaml
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
@@ -55,7 +56,7 @@ def diagnose_folder(
     bench, found = diagnosed(path, spec, exclude)
     verdict = found.verdict
     with aside(track) as tracked:
-        _write(found, bench, folder, experiment)
+        _write(found, bench, folder, experiment, _differing(spec["actuator"]))
         if corrected is not None:
             undone = write_corrected(found, bench.recordings, path, corrected)
             print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
@@ -81,10 +82,19 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     return bench, found
 
 
-def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None) -> None:
+def _differing(actuator: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that are not those of the reference actuator."""
+    reference = read_yaml(CONF / "actuator" / "reference.yaml")
+    return {name: value for name, value in actuator.items() if value != reference[name]}
+
+
+def _write(
+    found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None, actuator: Mapping[str, Any]
+) -> None:
     verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
-    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
+    name = f"diagnosed_{file_name(bench.name)}"
+    text = experiment_text(verdict, verdict["simulator"]["after"], name, actuator)
     write_text(folder / VERDICT, checked(verdict))
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:

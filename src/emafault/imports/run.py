@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -172,7 +172,9 @@ def import_bench(
         ]
         source = {"source": " ".join(Path(p).name for p in entry["files"].values()), "source_sha256": " ".join(digests)}
         recording = result.recordings[name]
-        attributes = recording.attributes | source | {"import_map": json.dumps(plain, sort_keys=True)}
+        attributes = recording.attributes | source | {
+            "import_map": json.dumps(plain, sort_keys=True), "actuator": json.dumps(asdict(actuator)),
+        }  # fmt: skip
         write_recording(folder / name, replace(recording, attributes=attributes))
     draw(result, plain).write(folder / PAGE)
     return result

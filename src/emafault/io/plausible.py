@@ -178,7 +178,7 @@ def refuse_implausible(path: str, recording: Recording, actuator: ActuatorParame
     certain = abs(angle) > CERTAIN * found.K_error / max(abs(found.K), 1e-30)
     if k_known and certain and abs(angle) > LINE_TO_LINE[0] and of_k > LINE_TO_LINE[1]:
         raise InputError(
-            f"{path}: phase_voltage is {of_k:.2f} times a phase's back-EMF, {np.rad2deg(angle):.0f} degrees from it, as if "
+            f"{path}: phase_voltage is {of_k:.2f} times a phase's back-EMF, {np.rad2deg(angle):.0f} degrees off, as if "
             "measured from line to line; accepted is against the star point, as emafault import makes it"
         )
     if k_known and not OF_K[0] < of_k < OF_K[1]:
