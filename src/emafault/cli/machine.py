@@ -10,11 +10,11 @@ def add_actuator(parser: argparse.ArgumentParser) -> None:
 
 def with_actuator(args: argparse.Namespace, overrides: list[str]) -> list[str]:
     """Overrides with what ``--actuator`` stands for before them, so that single values can still be changed."""
-    return overrides if args.actuator is None else [f"actuator={_yaml(args.actuator)}", *overrides]
+    return overrides if args.actuator is None else [of_file(args.actuator), *overrides]
 
 
-def _yaml(path: str) -> str:
-    """The path, refused here if it is not that of YAML, which an override would take for the name of an option.
+def of_file(path: str) -> str:
+    """The override of a file, refused here if it is not YAML, which an override would take for the name of an option.
 
     Raises
     ------
@@ -24,4 +24,4 @@ def _yaml(path: str) -> str:
 
     if not path.endswith((".yaml", ".yml")):
         raise InputError(f"--actuator: got '{shown(path)}', accepted is the path of a .yaml file")
-    return path
+    return f"actuator={path}"

@@ -16,6 +16,7 @@ from ..identification.recordings import Model
 from ..paths import results_folder
 from ..places import kind
 from ..plain import read_json, read_yaml
+from .machine import of_file
 
 
 def load_model(
@@ -74,7 +75,7 @@ def _composed(experiment: str, actuator: str | None) -> dict[str, Any]:
     """An experiment's configuration, of one's own actuator with its tolerance as what is known of R0, k0 and L0."""
     if actuator is None:
         return configuration.compose(experiment)
-    config = configuration.compose(experiment, [f"actuator={actuator}"])
+    config = configuration.compose(experiment, [of_file(actuator)])
     own = config["tolerances"]
     known = {**own["unit_calibration"], **own["inductance_tolerance"]}
     unit = config["unit"] | {"known": {q: known[f"{q}_scale"] for q in "RkL"}}

@@ -14,9 +14,12 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..diagnosis.evidence import Definite
+from ..diagnosis import wandering
 from ..diagnosis.fit import NOTHING, Bench
+from ..diagnosis.model import SETTINGS
+from ..diagnosis.naming import read
 from ..effects.scaling import scaled
+from ..equations.diagnose import covariance
 from ..equations.machine import ReferenceActuator
 from ..equations.signals import Signals, estimated_noise
 from ..errors import InputError, shown
@@ -26,7 +29,7 @@ from ..reconstruction.calibration import calibrate_recordings
 from .compose import TOLERANCE, Composed, Machine, Z
 
 WIDE = 0.5  # standard deviation over the value of the prior of every number, about where the last round left it
-ROUNDS = 6
+ROUNDS, LAST_ROUNDS = 6, 2  # with nothing beside the numbers, then with what else the recordings show
 STILL = 0.01  # relative change of every number, or a tenth of its standard error, that ends the rounds
 TOLD = 0.5  # of the prior's width; what is left wider than that the recordings do not tell
 LARGEST_MISFIT = 30.0  # root mean square of an equation's errors over their noise; beyond it the machine is another one
@@ -61,22 +64,15 @@ def identify_actuator(machine: Machine, files: Sequence[str | Path], noise: Sens
     recordings = _healthy(files, machine.actuator)
     own = estimated_noise(list(recordings.values()), noise)
     actuator = _electrical(recordings, machine.actuator)
-    for _ in range(ROUNDS):
-        bench = _bench(recordings, actuator, own)
-        bench.settle(NOTHING)
-        found, error = _told(bench)
-        before, actuator = actuator, _moved(actuator, found)
-        change = {n: abs(log(getattr(actuator, n) / getattr(before, n))) for n in found}
-        if all(c < max(STILL, 0.1 * error[n]) for n, c in change.items()):
-            break
-    misfit = _misfit(bench)
-    worst = max(misfit, key=lambda e: misfit[e])
-    if misfit[worst] > LARGEST_MISFIT:
-        raise InputError(
-            f"{worst} equation: leaves {misfit[worst]:.3g} times its noise at best; the recordings are of another "
-            "actuator, or their sensors are off"
-        )
-    return _compared(machine, actuator, error, misfit)
+    told, causes = _Told({}, {}), tuple[str, ...]()
+    for rounds, beside in ((ROUNDS, False), (LAST_ROUNDS, True)):
+        for _ in range(rounds):
+            bench = _bench(recordings, actuator, own)
+            told, causes = _beside_causes(bench) if beside else (_alone(bench), ())
+            actuator = _moved(actuator, told.factor)
+            if all(abs(log(f)) < max(STILL, 0.1 * told.error[n]) for n, f in told.factor.items()):
+                break
+    return _compared(machine, actuator, told.error, causes, _misfit(bench))
 
 
 def _healthy(files: Sequence[str | Path], actuator: ActuatorParameters) -> dict[str, Recording]:
@@ -111,24 +107,45 @@ def _bench(recordings: Mapping[str, Recording], actuator: ActuatorParameters, no
     return bench
 
 
-def _told(bench: Bench) -> tuple[dict[str, float], dict[str, float]]:
-    """Factor on each number of the actuator, and its relative standard error, of what the recordings tell."""
+@dataclass(frozen=True)
+class _Told:
+    """Factor on each number of the actuator that the recordings tell, and its relative standard error."""
+
+    factor: dict[str, float]
+    error: dict[str, float]
+
+
+def _alone(bench: Bench) -> _Told:
+    """What the numbers are where nothing else acts."""
+    bench.settle(NOTHING)
     normal = bench.normal(bench.linearise(NOTHING), NOTHING)
-    names = [n for n in bench.nuisances if n in normal.index]
-    k = np.array([normal.index[n] for n in names])
-    sd = np.array([bench.prior(n)[1] for n in names])
-    A = normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
-    spread = sd * np.sqrt(np.diag(Definite(A).solve(np.eye(len(k)))))
-    error = dict(zip(names, spread, strict=True))
-    out, errors = {}, {}
+    return _told(bench, bench.values(), *covariance(bench, normal, NOTHING))
+
+
+def _beside_causes(bench: Bench) -> tuple[_Told, tuple[str, ...]]:
+    """What they are beside the effects and forms that the recordings show, and these in words."""
+    fit = bench.fit()
+    reading = read(fit.models, fit.search.units.values(), wandering=wandering.log_odds(bench))
+    likely = bool(reading.named or reading.groups) and bool(reading.sets)
+    leading = reading.sets[0][2] if likely else fit.models[0]
+    values = bench.inserted(leading, fit.normal).values
+    # a remainder of the controller's own equations is none of the machine
+    left = [r.split(":", 1)[1] for r in reading.remainders if r.split(":", 1)[1] not in SETTINGS]
+    words = [*reading.named, *(" or ".join(g) for g in reading.groups), *reading.forms]
+    words += [f"more than noise in the {equation} equation" for equation in left]
+    return _told(bench, values, *covariance(bench, fit.normal, leading)), tuple(words)
+
+
+def _told(bench: Bench, values: Mapping[str, float], index: Mapping[str, int], spread: np.ndarray) -> _Told:
+    out = _Told({}, {})
     for name, full in {**OFF, **CONTROLLER}.items():
-        if full not in error:
+        if full not in index:
             continue
-        value, off = bench.point[full], bench.parameters[full].off
-        relative = float(error[full] / abs(value))
+        relative = float(np.sqrt(spread[index[full], index[full]]) / abs(values[full]))
         if relative < TOLD * WIDE:
-            out[name], errors[name] = float(value / off), relative
-    return out, errors
+            out.factor[name] = float(values[full] / bench.parameters[full].off)
+            out.error[name] = relative
+    return out
 
 
 def _moved(actuator: ActuatorParameters, factors: Mapping[str, float]) -> ActuatorParameters:
@@ -161,9 +178,24 @@ OF = {
 
 
 def _compared(
-    machine: Machine, actuator: ActuatorParameters, error: Mapping[str, float], misfit: Mapping[str, float]
+    machine: Machine,
+    actuator: ActuatorParameters,
+    error: Mapping[str, float],
+    causes: Sequence[str],
+    misfit: Mapping[str, float],
 ) -> Identified:
-    """The machine with what was told of it, and where that contradicts the file by more than both intervals."""
+    """The machine with what was told of it, and where that contradicts the file by more than both intervals.
+
+    Raises
+    ------
+    InputError : an equation that leaves so much that the recordings are of another machine
+    """
+    worst = max(misfit, key=lambda e: misfit[e])
+    if misfit[worst] > LARGEST_MISFIT:
+        raise InputError(
+            f"{worst} equation: leaves {misfit[worst]:.3g} times its noise at best; the recordings are of another "
+            "actuator, their sensors are off, or an effect is large that emafault diagnose names"
+        )
     parameters, notes, kept = dict(machine.parameters), [], []
     for f in fields(ActuatorParameters):
         name, before = f.name, machine.parameters[f.name]
@@ -172,7 +204,7 @@ def _compared(
         if name not in error:
             kept.append(name)
             continue
-        wide = max([1.0, *(m for e, m in misfit.items() if e.startswith(OF[name]))])
+        wide = 1.0 if causes else max([1.0, *(m for e, m in misfit.items() if e.startswith(OF[name]))])
         now = getattr(actuator, name)
         tolerance = Z * wide * error[name]
         parameters[name] = Composed(now, tolerance, "identified", before.of)
@@ -181,10 +213,12 @@ def _compared(
                 f"{name}: {now:.4g} in the recordings contradicts {before.value:.4g} of the file ({before.of}), "
                 f"a factor of {now / before.value:.3g}"
             )
+    if causes:
+        notes.append(
+            f"these recordings show {', '.join(causes)} as well: the numbers are those beside it; emafault diagnose "
+            "says more"
+        )
     for equation, m in misfit.items():
-        if m > POOR:
-            notes.append(
-                f"{equation} equation: leaves {m:.2g} times its noise, by which intervals are widened; emafault "
-                "diagnose says what it lacks"
-            )
+        if m > POOR and not causes:
+            notes.append(f"{equation} equation: leaves {m:.2g} times its noise, by which intervals are widened")
     return Identified(replace(machine, parameters=parameters), tuple(notes), tuple(kept), misfit)

@@ -31,6 +31,7 @@ SCALES: dict[str, Callable[[Any], float]] = {
     "supply_resistance": lambda a: a.bus_voltage / a.current_limit,
     "inverse_loss": lambda a: 1.0 / (a.resistance * a.current_limit**2),
     "speed": lambda a: a.speed_limit,
+    "passing_time": lambda a: a.inductance / a.bus_voltage,  # in which an ampere passes from phase to phase
 }
 
 

@@ -13,7 +13,7 @@ from ..actuator.sensors import SensorNoise
 from ..diagnosis import wandering
 from ..diagnosis.closure import Ladder
 from ..diagnosis.described import another_form_of, curve
-from ..diagnosis.evidence import Definite
+from ..diagnosis.evidence import Definite, Normal
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
@@ -186,7 +186,7 @@ def _diagnosed(
     verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
-    posterior = _covariance(bench, fit, best)
+    posterior = covariance(bench, fit.normal, best)
     after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
@@ -388,12 +388,12 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
     return out
 
 
-def _covariance(bench: Bench, fit: Fit, model: Model) -> tuple[dict[str, int], np.ndarray]:
+def covariance(bench: Bench, normal: Normal, model: Model) -> tuple[dict[str, int], np.ndarray]:
     """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
-    k = np.array([fit.normal.index[n] for n in names])
+    k = np.array([normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
-    A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
+    A = normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
     return {n: k for k, n in enumerate(names)}, Definite(A).solve(np.eye(len(k))) * np.outer(sd, sd)
 
 

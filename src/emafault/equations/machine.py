@@ -111,11 +111,12 @@ class ReferenceActuator:
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
         full = "controller.commutation_time"
         out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
+        passing = scale("passing_time", a)
         full = "controller.commutation_slope"
-        out[full] = Parameter(full, 4e-6, 4e-6, 1e-5, "s/A")
+        out[full] = Parameter(full, 4e-6 * passing, 4e-6 * passing, 1e-5 * passing, "s/A")
         for name, sd, units in (
             ("speed", 1e-5, "s"),
-            ("power", 1e-5, "s/A"),
+            ("power", 1e-5 * passing, "s/A"),
             *((f"time_{j}", 1e-6, "s") for j in "abc"),
         ):
             full = f"controller.commutation_{name}"

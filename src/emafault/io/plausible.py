@@ -10,7 +10,7 @@ channels are late by, which grows with speed and is no mistake.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log10
 
 import numpy as np
@@ -23,13 +23,15 @@ from .recording import PHASES, Recording
 FUNDAMENTAL = 24.0 / np.pi**2 * np.sin(np.pi / 6.0)  # of the trapezoid with slopes of 60 degrees
 KNOWN = 0.05  # relative standard error below which a coefficient can refuse a recording
 #: over those of the actuator; beyond them it is another unit, or another actuator
-OF_K, OF_R, OF_BUS = (0.4, 2.2), (0.25, 4.0), (0.5, 1.6)
+OF_K, OF_R, OF_BUS = (0.6, 1.6), (0.25, 4.0), (0.5, 1.6)
+ABSENT = 0.2  # of k, below which no back-EMF turns with the angle
 LARGEST_ANGLE = np.deg2rad(12.0)  # electrical, of the angle's zero; the catalogue's effect has 5 degrees
 LINE_TO_LINE = (np.deg2rad(20.0), 1.4)  # angle and size of K from which voltages look measured from line to line
 UNBALANCED = 0.35  # of the currents' size, that their sum may be
 OFFSET = 0.05  # of the supply, that a voltage may be off by at rest
 CERTAIN = 6.0  # standard errors
 FROZEN_TURNS, FROZEN = 4.0 * np.pi, 0.05  # electrical rad and s, through which a channel of a phase must change
+MOST_POLE_PAIRS = 20  # that are tried where those told do not turn with the voltages
 LOST = 2.0 * np.pi / 3.0  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 MOVING = 2.0  # rad/s
 FEWEST = 200  # samples in motion
@@ -171,9 +173,11 @@ def refuse_implausible(path: str, recording: Recording, actuator: ActuatorParame
     found = _fit(recording, actuator)
     if found is None:
         return
-    of_k = abs(found.K) / (FUNDAMENTAL * actuator.back_emf)
-    of_R = found.R / actuator.resistance
-    k_known, R_known = found.K_error < KNOWN * abs(found.K), found.R_error < KNOWN * abs(found.R)
+    nominal = FUNDAMENTAL * actuator.back_emf
+    of_k, of_R = abs(found.K) / nominal, found.R / actuator.resistance
+    k_known, R_known = found.K_error < KNOWN * max(abs(found.K), nominal), found.R_error < KNOWN * abs(found.R)
+    if k_known and of_k < ABSENT:
+        _refuse_pole_pairs(path, recording, actuator)
     angle = float(np.angle(found.K))
     certain = abs(angle) > CERTAIN * found.K_error / max(abs(found.K), 1e-30)
     if k_known and certain and abs(angle) > LINE_TO_LINE[0] and of_k > LINE_TO_LINE[1]:
@@ -200,6 +204,17 @@ def refuse_implausible(path: str, recording: Recording, actuator: ActuatorParame
     off = float(found.offset[j])
     if abs(off) > max(OFFSET * actuator.bus_voltage, CERTAIN * found.offset_error):
         raise InputError(f"{path}: phase_voltage of phase {PHASES[j]} has an offset of {1.5 * off:.3g} V")
+
+
+def _refuse_pole_pairs(path: str, recording: Recording, actuator: ActuatorParameters) -> None:
+    """Refuse another number of pole pairs than the one with which the back-EMFs turn."""
+    for pole_pairs in range(1, MOST_POLE_PAIRS + 1):
+        found = _fit(recording, replace(actuator, pole_pairs=pole_pairs))
+        if found is not None and OF_K[0] < abs(found.K) / (FUNDAMENTAL * actuator.back_emf) < OF_K[1]:
+            told = actuator.pole_pairs
+            raise InputError(
+                f"{path}: the back-EMFs turn {pole_pairs} times with the rotor, told are {told} pole_pairs"
+            )
 
 
 def _fit(r: Recording, a: ActuatorParameters) -> _Fitted | None:
