@@ -101,6 +101,14 @@ def test_smaller_contradictions_are_named_and_not_refused(tmp_path):
     assert len(notes) == 2 and "rated_torque" in notes[1] and "no_load_speed" in notes[0]
 
 
+def test_nothing_where_a_quantity_may_be_none(tmp_path):
+    path = written(tmp_path, backlash="0 rad", coulomb_friction="0 N m", viscous_friction="0 N m s/rad")
+    machine = of_file(path)
+    assert machine.actuator.coulomb_friction == 0.0 and machine.actuator.backlash == 1e-6
+    assert any("no_load_current" in note for note in machine.notes)
+    assert all(np.isfinite(p.high) for e in scaled(machine.actuator).values() for p in e.parameters.values())
+
+
 def test_the_schema_lists_the_keys():
     assert set(json.loads(SCHEMA.read_text())["properties"]) == {"name", *KEYS}
     for path in EXAMPLES.glob("*.yaml"):

@@ -235,7 +235,6 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "actuator show nowhere.yaml": ("nowhere.yaml", "no such file"),
     "actuator show good.nc": ("good.nc", "UTF-8"),
     "actuator identify nowhere.yaml good.nc": ("nowhere.yaml", "no such file"),
-    "actuator export nowhere.yaml --to sdf": ("--to", "'sdf'", "mjcf"),
     "diagnose bench --actuator nowhere.yaml": ("nowhere.yaml", "no such file"),
     "diagnose bench --actuator good.nc": ("--actuator", "good.nc", ".yaml"),
     "identify good.nc --actuator good.nc": ("--actuator", "good.nc", ".yaml"),

@@ -4,7 +4,7 @@ The motor is in star and driven in six steps: two phases in series carry the cur
 phase, and torque constant (N m/A) and line-to-line back-EMF constant (V s/rad) are both 2 k.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import exp, log
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ MECHANICAL_TIME = 9.4e-3  # s, J times line-to-line resistance over torque const
 FRICTION = 0.04  # of the torque at the current limit
 VISCOUS_SHARE = 0.3  # of the no-load torque at the no-load speed
 BACKLASH = 9e-4  # rad, three minutes of arc
+LEAST_BACKLASH = 1e-6  # rad, that stands for none
 NO_STOP = 100.0  # rad, as good as none
 SWITCH = 0.01  # of a phase's resistance
 ASSUMED = 0.9  # half of the 90 % interval of what is assumed, over it
@@ -131,6 +132,8 @@ class _Composer:
         self._friction(k, free)
         self._take("static_over_coulomb", "static_over_coulomb", 1.0, 1.5, "as is usual")
         self._take("backlash", "backlash", 1.0, BACKLASH, "three minutes of arc")
+        if self.value("backlash") < LEAST_BACKLASH:
+            self.p["backlash"] = replace(self.p["backlash"], value=LEAST_BACKLASH)
         self._take("end_stop", "travel", 1.0, NO_STOP, "no stop within reach")
         self._controller(k)
         self._take("switch_resistance", "switch_resistance", 1.0, SWITCH * R, "a hundredth of the phase's")
@@ -183,24 +186,19 @@ class _Composer:
         """Coulomb and viscous friction at the motor, by the torque at no load where one of both is not said."""
         I0, dry, wet = (self.sheet.get(n) for n in ("no_load_current", "coulomb_friction", "viscous_friction"))
         speed = free.value if free else self.value("speed_limit")
-        torque = 2.0 * k * I0.value if I0 else None
-        if dry is not None:
-            self._take("coulomb_friction", "coulomb_friction")
-        elif torque is not None:
+        at_no_load = Number(2.0 * k * I0.value, 0.5, I0.source, "") if I0 else None
+        self._take("coulomb_friction", "coulomb_friction", 1.0, FRICTION * 2.0 * k * self.value("current_limit"),
+                   "4 % of the torque at peak_current")  # fmt: skip
+        if dry is None and at_no_load is not None:
+            torque = at_no_load.value
             left = max(torque - wet.value * speed, 0.1 * torque) if wet else (1.0 - VISCOUS_SHARE) * torque
-            self.p["coulomb_friction"] = Composed(left, 0.5, I0.source, "no_load_current")  # type: ignore[union-attr]
-        else:
-            assumed = FRICTION * 2.0 * k * self.value("current_limit")
-            self.p["coulomb_friction"] = Composed(assumed, ASSUMED, "assumed", "4 % of the torque at peak_current")
-        if wet is not None:
-            self._take("viscous_friction", "viscous_friction")
-            return
-        if torque is not None and dry is not None:
-            left, of, source = max(torque - dry.value, 0.1 * torque), "no_load_current less coulomb_friction", I0.source  # type: ignore[union-attr]
-        else:
-            left = VISCOUS_SHARE / (1.0 - VISCOUS_SHARE) * self.value("coulomb_friction")
-            of, source = "three tenths of the torque at no load", "assumed"
-        self.p["viscous_friction"] = Composed(left / speed, ASSUMED, source, of)
+            self.p["coulomb_friction"] = Composed(left, at_no_load.tolerance, at_no_load.source, "no_load_current")
+        shared = VISCOUS_SHARE / (1.0 - VISCOUS_SHARE) * self.value("coulomb_friction")
+        self._take("viscous_friction", "viscous_friction", 1.0, shared / speed, "three tenths of the torque at no load")
+        if wet is None and dry is not None and at_no_load is not None:
+            left = max(at_no_load.value - dry.value, 0.1 * at_no_load.value) / speed
+            of = "no_load_current less coulomb_friction"
+            self.p["viscous_friction"] = Composed(left, ASSUMED, at_no_load.source, of)
 
     def _controller(self, k: float) -> None:
         J, limit = self.value("inertia"), self.value("current_limit")

@@ -63,6 +63,7 @@ def notes(sheet: Sheet, actuator: ActuatorParameters) -> list[str]:
     if {"no_load_current", "coulomb_friction", "viscous_friction"} <= given.keys():
         speed = given.get("no_load_speed", actuator.speed_limit)
         torque = given["coulomb_friction"] + given["viscous_friction"] * speed
+        torque = max(torque, 1e-3 * kt * given["no_load_current"])
         out += _compared(
             "no_load_current and both frictions", kt * given["no_load_current"], torque, 0.5, refused=False
         )
