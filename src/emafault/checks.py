@@ -24,6 +24,7 @@ _SCHEMAS = {
     "evaluation": schema.Evaluation,
     "tracking": schema.Tracking,
     "effects": dict[str, dict[str, float]],
+    "tolerances": dict[str, dict[str, float]],
     "variants": dict[str, list[str]],
     "name": str,
     "dataset": str,
@@ -55,7 +56,8 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     _check_reconstruction(config["reconstruction"])
     if config["command"]["name"] == "file" and kind(config["command"]["path"], "command.path") != "file":
         schema.refuse("command.path", config["command"]["path"], "the path of an existing file")
-    _check_effects(config["effects"])
+    _check_effects(config["effects"], config["actuator"])
+    _check_tolerances(config["tolerances"])
     schema.check_unlisted(config["unlisted"])
     in_machine = sum(entry["place"] in MACHINE for entry in config["unlisted"])
     if in_machine > MOST_TERMS:
@@ -95,7 +97,7 @@ def check_trained(config: Mapping[str, Any]) -> None:
         if key not in config:
             raise InputError(f"{key}: is missing from the configuration")
         schema.check(config[key], _SCHEMAS[key], key)
-    _check_effects(config["effects"])
+    _check_effects(config["effects"], config["actuator"])
     _check_reconstruction(config.get("reconstruction"))
 
 
@@ -170,14 +172,29 @@ def _calibrations() -> list[str]:
     return [id_ for id_, effect in EFFECTS.items() if any(p.tolerance for p in effect.parameters.values())]
 
 
-def _check_effects(effects: Mapping[str, Mapping[str, float]]) -> None:
+def _check_tolerances(tolerances: Mapping[str, Mapping[str, float]]) -> None:
     from .effects import EFFECTS
 
-    for effect, values in effects.items():
-        if effect not in EFFECTS:
-            raise InputError(schema.unknown_key(effect, "effects", list(EFFECTS)))
+    for effect, values in tolerances.items():
+        if effect not in _calibrations():
+            raise InputError(schema.unknown_key(effect, "tolerances", _calibrations()))
+        known = [name for name, p in EFFECTS[effect].parameters.items() if p.tolerance]
         for name, value in values.items():
-            key, parameters = f"effects.{effect}.{name}", EFFECTS[effect].parameters
+            if name not in known:
+                raise InputError(schema.unknown_key(name, f"tolerances.{effect}", known))
+            schema.check(value, float, f"tolerances.{effect}.{name}", {"low": schema.POSITIVE, "high": 1.0})
+
+
+def _check_effects(effects: Mapping[str, Mapping[str, float]], actuator: Mapping[str, Any]) -> None:
+    from .actuator.parameters import ActuatorParameters
+    from .effects.scaling import scaled
+
+    catalogue = scaled(ActuatorParameters(**actuator))
+    for effect, values in effects.items():
+        if effect not in catalogue:
+            raise InputError(schema.unknown_key(effect, "effects", list(catalogue)))
+        for name, value in values.items():
+            key, parameters = f"effects.{effect}.{name}", catalogue[effect].parameters
             if name not in parameters:
                 raise InputError(schema.unknown_key(name, f"effects.{effect}", list(parameters)))
             low, high = parameters[name].possible

@@ -25,9 +25,9 @@ from .plain import read_yaml
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
 #: keys of a composed configuration
-_KEYS = {*GROUPS, "name", "question", "dataset", "effects", "variants"}
+_KEYS = {*GROUPS, "name", "question", "dataset", "effects", "tolerances", "variants"}
 #: groups that diagnosing a bench reads
-DIAGNOSED = ("actuator", "sensors", "tracking")
+DIAGNOSED = ("actuator", "sensors", "tolerances", "tracking")
 LONGEST_KEY = 200
 _GIVEN = "emafault_given_experiment"
 RUNS_OF_A_SHARD = 1000  # some 4 s of work and 280 MB for runs of 1 s
@@ -100,7 +100,8 @@ def compose(experiment: str = "paper", overrides: str | Iterable[str] | None = N
     Parameters
     ----------
     experiment : a name in conf/experiment or the path of such a file (``.yaml``)
-    overrides : Hydra overrides, as one string or a list
+    overrides : Hydra overrides, as one string or a list; ``actuator=mine.yaml`` takes the file of an actuator (see
+        ``datasheet``)
 
     Returns
     -------
@@ -123,7 +124,18 @@ def compose(experiment: str = "paper", overrides: str | Iterable[str] | None = N
 def _composed(experiment: str, overrides: list[str]) -> dict[str, Any]:
     """The same of overrides of which the last one counts."""
     path, given = _experiment_file(experiment)
-    return _compose(path, path.read_text(encoding="utf-8") if given else "", tuple(overrides))
+    texts = [item for text in overrides for item in _of_actuator_file(text)]
+    return _compose(path, path.read_text(encoding="utf-8") if given else "", tuple(texts))
+
+
+def _of_actuator_file(text: str) -> list[str]:
+    """An override; of one that names the file of an actuator those of its numbers."""
+    key, _, value = text.partition("=")
+    if key != "actuator" or not value.endswith((".yaml", ".yml")):
+        return [text]
+    from .datasheet.compose import of_file
+
+    return of_file(file_at(value, "actuator")).overrides()
 
 
 @functools.cache
@@ -219,8 +231,9 @@ def _checked_override(text: str) -> str:
         chosen = item.value()
         for option in chosen if isinstance(chosen, list) and key == "reconstruction" else [chosen]:
             if option not in options:
-                raise InputError(f"{key}: got {option!r}, accepted is {', '.join(options)}")
-    if key.startswith("effects.") and not text.startswith(("+", "~")):
+                own = " or the path of a .yaml file" if key == "actuator" else ""
+                raise InputError(f"{key}: got {option!r}, accepted is {', '.join(options)}{own}")
+    if key.startswith(("effects.", "tolerances.")) and not text.startswith(("+", "~")):
         return f"++{text}"
     return text
 
@@ -314,8 +327,9 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
         "recordings_of_a_unit": unit["reference_recordings"] if part == "reference" else 1,
     }
     spec["shards"] = sampling["shards"] or number_of_shards(spec["runs"] * spec["recordings_of_a_unit"])
-    if config["unlisted"]:
-        spec["unlisted"] = config["unlisted"]
+    for key in ("unlisted", "tolerances"):
+        if config[key]:
+            spec[key] = config[key]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)

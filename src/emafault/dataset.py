@@ -95,10 +95,12 @@ def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> Sa
     spread = {}
     if spec["tolerance"]:
         rng = np.random.default_rng([spec["unit_seed"], 4])
+        given = spec.get("tolerances", {})
         for effect in (EFFECTS[name] for name in spec["spread_of"] or EFFECTS):
             for name, parameter in effect.parameters.items():
                 if parameter.tolerance:
-                    deviation = spec["tolerance"] * parameter.tolerance
+                    own = given.get(effect.id, {}).get(name, parameter.tolerance)
+                    deviation = spec["tolerance"] * own
                     spread[effect.field(name)] = 1.0 + deviation * rng.standard_normal(number // repeats)
     return Sample(spec, faults, faults[:, 5] - colder, theta_0, spread)
 

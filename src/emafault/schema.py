@@ -213,15 +213,15 @@ class Tracking:
 
 _COMMANDS: dict[str, dict[str, tuple[float, float, str]]] = {
     "parabolic": {"acceleration": (-100.0, 100.0, "rad/s2")},
-    "ramp": {"speed": (-10.0, 10.0, "rad/s")},
-    "step": {"amplitude": (-0.5, 0.5, "rad"), "time": (0.0, 3600.0, "s")},
-    "sine": {"amplitude": (-0.5, 0.5, "rad"), "frequency": (POSITIVE, 1000.0, "Hz")},
+    "ramp": {"speed": (-100.0, 100.0, "rad/s")},
+    "step": {"amplitude": (-100.0, 100.0, "rad"), "time": (0.0, 3600.0, "s")},
+    "sine": {"amplitude": (-100.0, 100.0, "rad"), "frequency": (POSITIVE, 1000.0, "Hz")},
     "chirp": {
-        "amplitude": (-0.5, 0.5, "rad"),
+        "amplitude": (-100.0, 100.0, "rad"),
         "frequency_start": (0.0, 1000.0, "Hz"),
         "frequency_end": (0.0, 1000.0, "Hz"),
     },
-    "reversal": {"amplitude": (POSITIVE, 0.5, "rad"), "speed": (POSITIVE, 10.0, "rad/s")},
+    "reversal": {"amplitude": (POSITIVE, 100.0, "rad"), "speed": (POSITIVE, 100.0, "rad/s")},
 }
 #: settings that every entry of the group reconstruction has, whatever its method
 _WEIGHTED: list[tuple[str, Any, Any]] = [

@@ -57,6 +57,11 @@ OVERRIDES: dict[str, tuple[str, ...]] = {
     "faults=null": ("faults",),
     "faults=[paper]": ("faults",),
     "faults=../paper": ("faults", "../paper"),
+    "actuator=nowhere.yaml": ("actuator", "nowhere.yaml", "no such file"),
+    "actuator=good": ("actuator", "'good'", "reference"),
+    "actuator=bench.yaml\tactuator=reference": ("actuator", "twice"),
+    "tolerances.stribeck.a=0.1": ("tolerances.stribeck", "unit_calibration"),
+    "tolerances.inertia.scale=2": ("tolerances.inertia.scale", "2"),
     "faults.law=none": ("faults.law", "'none'", "stator_fixed"),
     "faults.law=???": ("faults.law", "needs a value"),
     "~faults": ("faults",),
@@ -226,6 +231,16 @@ TARGETS: dict[str, tuple[str, ...]] = {
 
 #: whole lines; ``{long}`` stands for 5000 characters
 OTHERS: dict[str, tuple[str, ...]] = {
+    "actuator": ("show,identify,export",),
+    "actuator show nowhere.yaml": ("nowhere.yaml", "no such file"),
+    "actuator show good.nc": ("good.nc", "UTF-8"),
+    "actuator identify nowhere.yaml good.nc": ("nowhere.yaml", "no such file"),
+    "diagnose bench --actuator nowhere.yaml": ("nowhere.yaml", "no such file"),
+    "diagnose bench --actuator good.nc": ("--actuator", "good.nc", ".yaml"),
+    "identify good.nc --actuator good.nc": ("--actuator", "good.nc", ".yaml"),
+    "identify good.nc --diagnosis nowhere.json": ("nowhere.json", "no such file"),
+    "identify good.nc --diagnosis good.nc": ("good.nc", "UTF-8"),
+    "identify good.nc --diagnosis good.nc --method weighted": ("--method", "diagnosis"),
     "identify nowhere.nc": ("nowhere.nc: no such file",),
     f"identify {LONG}": ("too long",),
     "identify a\0b.nc": ("NUL",),

@@ -20,6 +20,7 @@ COMMANDS = {
     "identify": "identify the fault vector in recordings",
     "diagnose": "say where a simulator and a bench disagree, which effect causes it and how far it explains it",
     "plan": "say what to record next on a bench, and write the motions for it to play",
+    "actuator": "compose the file of one's own actuator, identify its numbers in healthy recordings, or export them",
 }
 
 

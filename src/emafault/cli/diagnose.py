@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from .machine import add_actuator, with_actuator
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -13,6 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OVERRIDE",
         help="Hydra overrides of the nominal actuator, as actuator.gear_ratio=400",
     )
+    add_actuator(parser)
     parser.add_argument("--out", metavar="DIR", help="folder to write to (results/diagnoses/<name of the bench>)")
     parser.add_argument(
         "--twin",
@@ -46,7 +49,8 @@ def run(args: argparse.Namespace) -> None:
     from ..reporting.written import refuse_experiment
 
     actuator = args.twin == "actuator"
-    config.refuse_unread(args.overrides, config.DIAGNOSED if actuator else ("tracking",), "diagnose")
+    overrides = with_actuator(args, args.overrides)
+    config.refuse_unread(overrides, config.DIAGNOSED if actuator else ("tracking",), "diagnose")
     target = None
     if args.experiment:
         word = args.experiment
@@ -54,14 +58,14 @@ def run(args: argparse.Namespace) -> None:
             raise InputError(f"--experiment: got '{shown(word)}', accepted are letters, digits, _ and -")
         target = config.CONF / "experiment" / f"{word}.yaml"
         refuse_experiment(target)
-    spec = config.diagnosis_spec(config.compose(overrides=args.overrides))
+    spec = config.diagnosis_spec(config.compose(overrides=overrides))
     tracking = not args.no_tracking
     if actuator:
         from ..equations.run import diagnose_folder
 
         diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, args.corrected, args.force)
         if args.corrected:
-            print(identified(args.path, args.corrected))
+            print(identified(args.path, args.corrected, args.actuator))
     else:
         if args.corrected:
             raise InputError("--corrected: only recordings of the actuator can be corrected")
@@ -74,7 +78,7 @@ def run(args: argparse.Namespace) -> None:
         print(f"snakemake --cores all --config experiment={Path(target).stem}")
 
 
-def identified(bench: str | Path, corrected: str | Path) -> str:
+def identified(bench: str | Path, corrected: str | Path, actuator: str | None = None) -> str:
     """Fault vectors identified in recordings of a bench and in the corrected ones, as aligned text.
 
     By what ``emafault identify`` uses unless told otherwise; a recording that determines no fault vector is left out.
@@ -85,7 +89,7 @@ def identified(bench: str | Path, corrected: str | Path) -> str:
     from ..io.recording import read_recording, recordings_in
     from .model import load_model
 
-    model = load_model("paper")
+    model = load_model("paper", actuator=actuator)
     originals = {path.name: path for path in recordings_in([bench])}
     width = max(len("identified in"), *(len(name) for name in originals))
     lines = [f"{'identified in':{width}} {'':>9} " + " ".join(f"{name:>9}" for name in FAULT_NAMES)]

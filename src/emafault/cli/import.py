@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from .machine import add_actuator, with_actuator
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -13,6 +15,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="files to list, or to guess a map for; of an import, Hydra overrides of the nominal actuator, as "
         "actuator.pole_pairs=7",
     )
+    add_actuator(parser)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--list", action="store_true", help="show the channels of the files, with units and rates")
     what.add_argument("--guess", metavar="MAP", help="write a map guessed from the channels' names and units")
@@ -34,7 +37,7 @@ def run(args: argparse.Namespace) -> None:
     if args.map:
         if not args.out:
             raise InputError("--map: needs --out DIR, a folder to write to")
-        _import(args.map, args.out, args.overrides, args.force)
+        _import(args.map, args.out, with_actuator(args, args.overrides), args.force)
         return
     if not files:
         raise InputError("no file is named; name at least one")

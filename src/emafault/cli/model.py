@@ -16,9 +16,12 @@ from ..identification.recordings import Model
 from ..paths import results_folder
 from ..places import kind
 from ..plain import read_json, read_yaml
+from .machine import of_file
 
 
-def load_model(experiment: str, choice: str | None = None, results: str | Path | None = None) -> Model:
+def load_model(
+    experiment: str, choice: str | None = None, results: str | Path | None = None, actuator: str | None = None
+) -> Model:
     """The estimator of an experiment.
 
     Parameters
@@ -26,6 +29,7 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
     experiment : name of a trained experiment; of one that was not trained here only the closed form is had
     choice : ``reconstruction`` or ``reconstruction/estimator``; None takes the most accurate on fresh rows
     results : folder of results; None takes ``results`` here, else that of the project
+    actuator : file of one's own actuator, for which only the closed form is had: it needs no training
 
     Raises
     ------
@@ -37,16 +41,17 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
         raise InputError(f"--results: {shown(results)}: no such folder, accepted is one of results (results)")
     checks.check_name("experiment", experiment)
     folder = Path(results) / "experiments" / experiment
-    trained = os.path.lexists(folder / "configuration.yaml")
-    config = _read_configuration(folder / "configuration.yaml") if trained else configuration.compose(experiment)
+    trained = os.path.lexists(folder / "configuration.yaml") and actuator is None
+    config = _read_configuration(folder / "configuration.yaml") if trained else _composed(experiment, actuator)
     if config.get("variants") and not trained:
         raise InputError(
             f"experiment: '{experiment}' is a study, accepted is one of its variants, {experiment}/<variant>"
         )
     methods = config["reconstruction"]
-    known = {f"{p.parent.parent.name}/{p.parent.name}" for p in folder.glob("identifiers/*/*/history.json")}
+    saved = folder.glob("identifiers/*/*/history.json") if actuator is None else ()
+    known = {f"{p.parent.parent.name}/{p.parent.name}" for p in saved}
     known |= {f"{name}/closed_form" for name in methods}
-    name = choice or _most_accurate(folder, config, known)
+    name = choice or _most_accurate(folder if actuator is None else None, config, known)
     if "/" not in name:
         name = next((f"{name}/{e}" for e in ("searched", "network") if f"{name}/{e}" in known), f"{name}/closed_form")
     if name not in known:
@@ -56,13 +61,25 @@ def load_model(experiment: str, choice: str | None = None, results: str | Path |
         raise InputError(f"--method: got '{shown(choice)}', accepted are {', '.join(sorted(known))}{hint}")
     reconstruction, estimator = name.split("/")
     settings = dict(methods[reconstruction])
-    saved = folder / "identifiers" / reconstruction / estimator / "seed_0"
-    if not saved.is_dir() and settings["method"] == "paper":
+    fitted = folder / "identifiers" / reconstruction / estimator / "seed_0"
+    load = actuator is None and fitted.is_dir()
+    if not load and settings["method"] == "paper":
         raise InputError(
             f"--method: '{name}' has no intervals before training; snakemake --config experiment={experiment}"
         )
-    identifier = Identifier.load(saved) if saved.is_dir() else untrained_closed_form(config)
+    identifier = Identifier.load(fitted) if load else untrained_closed_form(config)
     return Model(name, settings.pop("method"), settings, identifier, config["sensors"]["ambient"])
+
+
+def _composed(experiment: str, actuator: str | None) -> dict[str, Any]:
+    """An experiment's configuration, of one's own actuator with its tolerance as what is known of R0, k0 and L0."""
+    if actuator is None:
+        return configuration.compose(experiment)
+    config = configuration.compose(experiment, [of_file(actuator)])
+    own = config["tolerances"]
+    known = {**own["unit_calibration"], **own["inductance_tolerance"]}
+    unit = config["unit"] | {"known": {q: known[f"{q}_scale"] for q in "RkL"}}
+    return config | {"unit": unit}
 
 
 def untrained_closed_form(config: Mapping[str, Any]) -> Identifier:
@@ -83,10 +100,10 @@ def _read_configuration(path: Path) -> dict[str, Any]:
     return config
 
 
-def _most_accurate(folder: Path, config: Mapping[str, Any], known: set[str]) -> str:
+def _most_accurate(folder: Path | None, config: Mapping[str, Any], known: set[str]) -> str:
     """The trained estimator with the smallest error over range on fresh rows; without an evaluation the closed form."""
-    path = folder / "evaluation" / "metrics.json"
-    if not os.path.lexists(path):
+    path = folder / "evaluation" / "metrics.json" if folder is not None else None
+    if path is None or not os.path.lexists(path):
         methods = list(config["reconstruction"])
         best = next((name for name in ("nine", "weighted_floating") if name in methods), methods[-1])
         return f"{best}/closed_form"

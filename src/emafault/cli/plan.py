@@ -2,6 +2,8 @@
 
 import argparse
 
+from .machine import add_actuator, with_actuator
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -14,6 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OVERRIDE",
         help="Hydra overrides of the nominal actuator, as actuator.gear_ratio=400",
     )
+    add_actuator(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for the motions (results/plans/<name of the bench>)")
     parser.add_argument("--force", action="store_true", help="replace files that are no motions")
 
@@ -28,5 +31,6 @@ def run(args: argparse.Namespace) -> None:
     from .. import config
     from ..equations.plan import plan
 
-    config.refuse_unread(args.overrides, config.DIAGNOSED, "plan")
-    plan(args.path, config.diagnosis_spec(config.compose(overrides=args.overrides)), args.out, args.force)
+    overrides = with_actuator(args, args.overrides)
+    config.refuse_unread(overrides, config.DIAGNOSED, "plan")
+    plan(args.path, config.diagnosis_spec(config.compose(overrides=overrides)), args.out, args.force)

@@ -5,11 +5,12 @@ import re
 from pathlib import Path
 
 from . import whole_number
+from .machine import add_actuator, with_actuator
 
 #: groups of the configuration that a simulated recording depends on
 READS = (
-    "actuator", "command", "effects", "faults", "load", "magnet", "recording", "sensors", "temperature", "unit",
-    "unlisted",
+    "actuator", "command", "effects", "faults", "load", "magnet", "recording", "sensors", "temperature", "tolerances",
+    "unit", "unlisted",
 )  # fmt: skip
 
 
@@ -20,6 +21,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "overrides", nargs="*", metavar="OVERRIDE", help="Hydra overrides such as command=sine effects.stribeck.a=0.01"
     )
+    add_actuator(parser)
     parser.add_argument(
         "--fault",
         nargs="+",
@@ -61,7 +63,7 @@ def run(args: argparse.Namespace) -> None:
         _replay(args)
         return
     fault, overrides = read_fault(args.fault)
-    overrides = [*args.overrides, *overrides]
+    overrides = with_actuator(args, [*args.overrides, *overrides])
     config.refuse_unread(overrides, READS, "simulate")
     composed = config.compose(args.experiment, overrides)
     motion = [composed["command"]["path"]] if composed["command"]["name"] == "file" else []
@@ -90,7 +92,8 @@ def _replay(args: argparse.Namespace) -> None:
 
     if args.fault or args.health or args.unit:
         raise InputError("--replay: takes fault, health and unit from the bench, accepted are overrides and --seed")
-    spec, plain = (config.replay_spec(config.compose(e, args.overrides)) for e in (args.experiment, "paper"))
+    overrides = with_actuator(args, args.overrides)
+    spec, plain = (config.replay_spec(config.compose(e, overrides)) for e in (args.experiment, "paper"))
     for each in (spec, plain):
         each["dataset"]["seed"] = args.seed
     compared, without = replay_bench(args.replay, args.file, spec, plain, Path(args.experiment).parent)

@@ -20,7 +20,8 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # every process reads t
 class EffectParameter:
     """One parameter: units, nominal value (the effect is off), realistic range, tolerance (1 sigma over nominal).
 
-    ``follows`` names the actuator's parameter that is the nominal value where the configuration changes it.
+    ``follows`` names the actuator's parameter that is the nominal value where the configuration changes it, ``scales``
+    what the numbers go with from actuator to actuator (see ``scaling``).
     """
 
     units: str
@@ -29,6 +30,7 @@ class EffectParameter:
     high: float
     tolerance: float = 0.0
     follows: str = ""
+    scales: str = ""
 
     @property
     def possible(self) -> tuple[float, float]:

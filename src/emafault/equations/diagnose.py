@@ -13,13 +13,14 @@ from ..actuator.sensors import SensorNoise
 from ..diagnosis import wandering
 from ..diagnosis.closure import Ladder
 from ..diagnosis.described import another_form_of, curve
-from ..diagnosis.evidence import Definite
+from ..diagnosis.evidence import Definite, Normal
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
 from ..effects import EFFECTS
+from ..effects.scaling import scaled
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
@@ -79,6 +80,7 @@ def diagnose(
     noise: SensorNoise,
     exclude: Sequence[str] = (),
     processes: int = 1,
+    tolerances: Mapping[str, Mapping[str, float]] | None = None,
 ) -> "Diagnosed":
     """Diagnose a bench: its verdict, in the format of ``diagnosis.json``, and the fit that it rests on.
 
@@ -89,6 +91,7 @@ def diagnose(
     noise : of the sensors, where the recordings do not tell it
     exclude : effects that the library is to lack
     processes : in which recordings are linearised side by side
+    tolerances : of this actuator, see ``effects.scaling.scaled``
 
     Raises
     ------
@@ -99,7 +102,8 @@ def diagnose(
             raise InputError(f"exclude: '{effect}' is not an effect, accepted are {', '.join(EFFECTS)}")
     explore, confirm = split
     own = estimated_noise([recordings[n] for n in explore], noise)
-    machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, exclude)
+    library = exclude, scaled(actuator, tolerances)
+    machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, *library)
     bench = Bench(machine, list(explore), processes)
     first = _spread(recordings, explore)
     if len(first) < len(explore):
@@ -119,7 +123,7 @@ def diagnose(
     # from here on the confirm recordings are open
     known = machine.recordings
     signals = {n: known[n] if n in known else Signals.of(n, r, actuator, own) for n, r in recordings.items()}
-    whole = ReferenceActuator(actuator, signals, exclude)
+    whole = ReferenceActuator(actuator, signals, *library)
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
@@ -182,7 +186,7 @@ def _diagnosed(
     verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
-    posterior = _covariance(bench, fit, best)
+    posterior = covariance(bench, fit.normal, best)
     after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
@@ -384,12 +388,12 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
     return out
 
 
-def _covariance(bench: Bench, fit: Fit, model: Model) -> tuple[dict[str, int], np.ndarray]:
+def covariance(bench: Bench, normal: Normal, model: Model) -> tuple[dict[str, int], np.ndarray]:
     """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
-    k = np.array([fit.normal.index[n] for n in names])
+    k = np.array([normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
-    A = fit.normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
+    A = normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
     return {n: k for k, n in enumerate(names)}, Definite(A).solve(np.eye(len(k))) * np.outer(sd, sd)
 
 

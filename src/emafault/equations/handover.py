@@ -10,13 +10,19 @@ from .carried import entries, left_out
 from .telling import differing_gains
 
 
-def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[str, float]], name: str) -> str:
+def experiment_text(
+    verdict: Mapping[str, Any],
+    effects: Mapping[str, Mapping[str, float]],
+    name: str,
+    actuator: Mapping[str, float] | None = None,
+) -> str:
     """A Hydra experiment in YAML.
 
     Parameters
     ----------
     effects : effect -> parameter -> value, as fitted; the unit's tolerances are values of the calibration effects
     name : of the experiment and its folder of results
+    actuator : parameters that are not those of the reference actuator
     """
     from omegaconf import OmegaConf
 
@@ -31,8 +37,9 @@ def experiment_text(verdict: Mapping[str, Any], effects: Mapping[str, Mapping[st
         "question": escaped(f"How well is the actuator of bench {bench} identified with {what} simulated?"),
         "effects": rounded,
     }
-    if gains:
-        content["actuator"] = {gain: float(f"{g['value']:.8g}") for gain, g in gains.items()}
+    own = dict(actuator or {}) | {gain: float(f"{g['value']:.8g}") for gain, g in gains.items()}
+    if own:
+        content["actuator"] = own
     if unlisted:
         content["unlisted"] = unlisted
     body = OmegaConf.to_yaml(OmegaConf.create(content))

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import SETTINGS, Block, Parameter, Unit, Variant
-from ..effects import EFFECTS, Effect
+from ..effects import Effect
+from ..effects.scaling import scale, scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .dual import Dual, value_of
 from .point import SEEDED, Point, State
@@ -62,23 +63,30 @@ class ReferenceActuator:
     name = "actuator"
     moving = (("angle", "commutation"),)  # channel and equation, what shows of one in the other depends on the point
 
-    def __init__(self, actuator: ActuatorParameters, recordings: Mapping[str, Signals], exclude: Sequence[str] = ()):
+    def __init__(
+        self,
+        actuator: ActuatorParameters,
+        recordings: Mapping[str, Signals],
+        exclude: Sequence[str] = (),
+        catalogue: Mapping[str, Effect] | None = None,
+    ):
         self.actuator = actuator
+        self.catalogue = dict(catalogue or scaled(actuator))
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
         self._along: dict[tuple[str, str], dict[str, Any]] = {}
         self._functions: dict[str, dict[str, Any]] = {}
         self.large = sum(r.size for r in self.recordings.values()) > LARGE
         self.left_out = tuple(exclude)
-        self.effects = {k: e for k, e in EFFECTS.items() if k not in exclude}
+        self.effects = {k: e for k, e in self.catalogue.items() if k not in exclude}
         self.parameters = self._nuisances()
         self.units = [self._unit(e) for e in self.effects.values() if e.id != "speed_quantisation"]
         self.units += self._forms()
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)
-        for effect in EFFECTS.values():  # one left out of the library is off
-            for name, q in _internal(effect).items():
+        for effect in self.catalogue.values():  # one left out of the library is off
+            for name, q in _internal(effect, actuator).items():
                 full = f"{effect.id}.{name}"
                 if full not in self.parameters and effect.id not in self.effects:
                     self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
@@ -91,7 +99,7 @@ class ReferenceActuator:
     def _nuisances(self) -> dict[str, Parameter]:
         a = self.actuator
         out: dict[str, Parameter] = {}
-        for effect in EFFECTS.values():
+        for effect in self.catalogue.values():
             for name, p in effect.parameters.items():
                 if p.tolerance > 0.0:
                     centre = getattr(a, p.follows) if p.follows else p.nominal
@@ -104,11 +112,12 @@ class ReferenceActuator:
             out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
         full = "controller.commutation_time"
         out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
+        passing = scale("passing_time", a)
         full = "controller.commutation_slope"
-        out[full] = Parameter(full, 4e-6, 4e-6, 1e-5, "s/A")
+        out[full] = Parameter(full, 4e-6 * passing, 4e-6 * passing, 1e-5 * passing, "s/A")
         for name, sd, units in (
             ("speed", 1e-5, "s"),
-            ("power", 1e-5, "s/A"),
+            ("power", 1e-5 * passing, "s/A"),
             *((f"time_{j}", 1e-6, "s") for j in "abc"),
         ):
             full = f"controller.commutation_{name}"
@@ -148,7 +157,6 @@ class ReferenceActuator:
         return out
 
     def _unit(self, effect: Effect) -> Unit:
-        module = TERMS[effect.id]
         parameters, positive = [], []
         if effect.kind == "calibration":
             for name, p in effect.parameters.items():
@@ -160,12 +168,12 @@ class ReferenceActuator:
                 )
             hole = [OUTSIDE * self.parameters[p.alias or ""].sd / p.sd for p in parameters]
             return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), min(hole), hole)])
-        internal = _internal(effect)
+        internal = _internal(effect, self.actuator)
         for name, q in internal.items():
             full = f"{effect.id}.{name}"
             parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units, vanishes=_vanishes(q.off)))
             positive.append(_sign(effect, name))
-        shapes = getattr(module, "SHAPES", ())
+        shapes = _shapes(effect, self.actuator)
         least = max((0.5 * _nearest(effect, n) / q.sd for n, q in internal.items()), default=0.0)
         variants = [Variant(parameters, positive, least)] if not shapes else []
         for n, shape in enumerate(shapes):
@@ -179,7 +187,7 @@ class ReferenceActuator:
     def observed(self) -> dict[str, dict[str, float]]:
         """Effects that the recordings show for certain, with their parameters: a speed that lies on a lattice."""
         steps = [r.speed_step for r in self.recordings.values()]
-        least = EFFECTS["speed_quantisation"].parameters["step"].low
+        least = self.catalogue["speed_quantisation"].parameters["step"].low
         if "speed_quantisation" in self.effects and min(steps) >= 0.5 * least:
             return {"speed_quantisation": {"step": float(np.median(steps))}}
         return {}
@@ -499,15 +507,30 @@ class _Internal:
         self.off, self.mean, self.sd, self.units = off, mean, sd, units
 
 
-def _internal(effect: Effect) -> dict[str, _Internal]:
+def _internal(effect: Effect, actuator: ActuatorParameters) -> dict[str, _Internal]:
     """Parameters that an effect is fitted in, with their priors."""
     own = getattr(TERMS[effect.id], "PARAMETERS", None)
     if own is not None:
-        return {n: _Internal(off, mean, sd, "") for n, (off, mean, sd) in own.items()}
+        out = {}
+        for n, numbers in own.items():
+            off, mean, sd = (_factor(effect, n, actuator) * x for x in numbers)
+            out[n] = _Internal(off, mean, sd, "")
+        return out
     return {
         n: _Internal(p.nominal, p.nominal, _width(p.nominal, p.low, p.high), p.units)
         for n, p in effect.parameters.items()
     }
+
+
+def _factor(effect: Effect, name: str, actuator: ActuatorParameters) -> float:
+    """What a number of an effect's own terms is multiplied by for this actuator."""
+    return scale(getattr(TERMS[effect.id], "SCALES", {}).get(name, ""), actuator)
+
+
+def _shapes(effect: Effect, actuator: ActuatorParameters) -> list[dict[str, float]]:
+    """Values of its parameters at which a secant is taken where no derivative at "off" exists."""
+    given = getattr(TERMS[effect.id], "SHAPES", ())
+    return [{n: _factor(effect, n, actuator) * x for n, x in shape.items()} for shape in given]
 
 
 def _sign(effect: Effect, name: str) -> int:

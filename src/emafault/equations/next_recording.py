@@ -28,7 +28,8 @@ RIVALS = 4
 PROPOSED = 3
 LARGEST_ODDS = 1e6
 NEXT = "next"
-#: command, its settings, length (s), soak temperatures (degC)
+#: command, its settings, length (s), soak temperatures (degC); for a shaft that turns at 1 rad/s at most and by 0.5 rad
+#: to either side
 MENU: tuple[tuple[str, Mapping[str, float], float, tuple[float, ...]], ...] = (
     ("parabolic", {"acceleration": 0.6}, 0.6, (20.0,)),
     ("ramp", {"speed": 0.03}, 1.0, (20.0, 80.0)),
@@ -37,7 +38,16 @@ MENU: tuple[tuple[str, Mapping[str, float], float, tuple[float, ...]], ...] = (
     ("sine", {"amplitude": 0.04, "frequency": 2.0}, 0.6, (20.0, 80.0)),
     ("chirp", {"amplitude": 0.01, "frequency_start": 1.0, "frequency_end": 12.0}, 0.6, (20.0,)),
 )
-UNITS = {"acceleration": "rad/s2", "speed": "rad/s", "amplitude": "rad"}
+UNITS = {"acceleration": "rad/s2", "speed": "rad/s", "amplitude": "rad"}  # what goes with the shaft's reach
+
+
+def menu(actuator: ActuatorParameters) -> list[tuple[str, dict[str, float], float, tuple[float, ...]]]:
+    """The menu for an actuator: motions of the same share of its speed, or of its travel where that is less."""
+    reach = min(actuator.speed_limit / actuator.gear_ratio, 2.0 * actuator.end_stop)
+    return [
+        (command, {k: float(f"{v * reach if k in UNITS else v:.3g}") for k, v in settings.items()}, duration, ambients)
+        for command, settings, duration, ambients in MENU
+    ]
 
 
 def next_recordings(
@@ -63,7 +73,7 @@ def next_recordings(
     before = {names: _log_odds(bench, fit.normal, first, rival, {}) for names, rival in rivals}
     named = _name(first, bench)
     found: list[dict[str, Any]] = []
-    for n, (command, settings, duration, ambients) in enumerate(MENU):
+    for n, (command, settings, duration, ambients) in enumerate(menu(actuator)):
         for ambient in ambients:
             recording = _imagined(actuator, noise, values, effects, (command, settings, duration, ambient), n)
             new, widths = _next_normal(bench, recording, noise)
@@ -110,7 +120,8 @@ def _next_normal(bench: Bench, recording: Recording, noise: SensorNoise) -> tupl
     """Normal matrix of the imagined recording at the point of the bench, without its residual; widths of the priors of
     what belongs to it alone."""
     actuator = bench.machine.actuator
-    machine = ReferenceActuator(actuator, {NEXT: Signals.of(NEXT, recording, actuator, noise)}, bench.machine.left_out)
+    signals, of = {NEXT: Signals.of(NEXT, recording, actuator, noise)}, bench.machine
+    machine = ReferenceActuator(actuator, signals, of.left_out, of.catalogue)
     new = Bench(machine, [NEXT])
     new.point |= {n: v for n, v in bench.point.items() if n in new.point}
     new.on = set(bench.on)

@@ -9,8 +9,9 @@ from ..actuator.sensors import SensorNoise
 from ..io.atomic import write_text
 from ..io.bench import Bench, bench_name, new_folder, read_bench
 from ..io.split import split_bench
-from ..paths import results_folder
+from ..paths import CONF, results_folder
 from ..places import file_name
+from ..plain import read_yaml
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
@@ -35,7 +36,7 @@ def diagnose_folder(
 
     Parameters
     ----------
-    spec : ``actuator``, ``sensors`` and ``tracking`` of a composed configuration
+    spec : ``actuator``, ``tolerances``, ``sensors`` and ``tracking`` of a composed configuration
     out : folder to write to; None takes ``results/diagnoses/<name of the bench>``
     exclude : effects that the library is to lack
     experiment : file that receives the fix as an experiment, besides the one among the results
@@ -55,7 +56,7 @@ def diagnose_folder(
     bench, found = diagnosed(path, spec, exclude)
     verdict = found.verdict
     with aside(track) as tracked:
-        _write(found, bench, folder, experiment)
+        _write(found, bench, folder, experiment, _differing(spec["actuator"]))
         if corrected is not None:
             undone = write_corrected(found, bench.recordings, path, corrected)
             print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
@@ -74,16 +75,26 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     actuator = ActuatorParameters(**spec["actuator"])
     bench = read_bench(path, actuator)
     split = split_bench(bench.recordings)
-    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
+    noise, tolerances = SensorNoise(**spec["sensors"]), spec["tolerances"]
+    found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, tolerances)
     found.verdict["warnings"] = bench.warnings
     print("\n".join(finding(found.verdict)), flush=True)
     return bench, found
 
 
-def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None) -> None:
+def _differing(actuator: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that are not those of the reference actuator."""
+    reference = read_yaml(CONF / "actuator" / "reference.yaml")
+    return {name: value for name, value in actuator.items() if value != reference[name]}
+
+
+def _write(
+    found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None, actuator: Mapping[str, Any]
+) -> None:
     verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
-    text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")
+    name = f"diagnosed_{file_name(bench.name)}"
+    text = experiment_text(verdict, verdict["simulator"]["after"], name, actuator)
     last = checked(verdict)
     truths = {n: r.fault for n, r in bench.recordings.items()}
     draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)

@@ -38,7 +38,9 @@ def residual(state: State) -> Dual:
     inertia: Dual | float = 1.0
     for m in with_hook("inertia"):
         inertia = inertia * m.inertia(state.p.of(effect_name(m)))
-    state.rotor_share = float(np.prod([m.rotor_share(state.p.of(effect_name(m))) for m in with_hook("rotor_share")]))
+    state.rotor_share = float(
+        np.prod([m.rotor_share(state.p.of(effect_name(m)), rec) for m in with_hook("rotor_share")])
+    )
     inertia = inertia * state.rotor_share
     net = net_torque(state)
     state.net = np.asarray(net.value)

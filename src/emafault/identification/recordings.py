@@ -17,6 +17,7 @@ from .posterior import CHANCE
 
 #: what a fault vector's components can be of any machine, a unit off nominal allowed for
 POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
+WARMTH, LARGEST_WARMTH = 30.0, 150.0  # K from the soak temperature, that are told, and that nothing explains
 #: relative error of R, k and L beside their noise up to which intervals are widened; beyond it nothing is identified
 LARGEST_MODEL_ERROR = 0.1
 
@@ -81,6 +82,7 @@ def identify_recordings(
         noise, said = _with_misfit(recording.name, own, noise, identifier, unit, covariance)
         estimates += identifier.estimate(inputs, level, noise, unit, covariance)
         _refuse_impossible(recording.name, estimates[-1])
+        said += _beside_ambient(recording, estimates[-1], identifier)
         beyond = float(identifier.outside(inputs, unit)[0])
         if beyond > 0.05:
             said.append(f"features lie {beyond:.0%} of their range outside what was learnt from")
@@ -129,6 +131,27 @@ def _with_misfit(
         noise = noise + np.eye(9) * (off * own.inputs) ** 2
         said.append(f"R, k and L fit no fault of this unit by {off:.2g} of their values: intervals are widened")
     return noise, said
+
+
+def _beside_ambient(
+    recording: Recording, estimate: Mapping[str, Mapping[str, float]], identifier: Identifier
+) -> list[str]:
+    """What the winding's temperature is above that it was soaked at, in words where it is far.
+
+    Raises
+    ------
+    InputError : further than any unit within commercial tolerances would look
+    """
+    soaked = recording.ambient_temperature - identifier.actuator.reference_temperature
+    above = estimate["dT"]["value"] - soaked
+    if abs(above) > LARGEST_WARMTH:
+        raise InputError(
+            f"{recording.name}: dT would be {estimate['dT']['value']:.4g} K where it was soaked at {soaked:.4g} K; its "
+            "sensors or ambient_temperature are mistaken, or it is of another actuator"
+        )
+    if abs(above) > WARMTH:
+        return [f"dT lies {above:.0f} K from the soak temperature: the unit is off nominal, --reference calibrates it"]
+    return []
 
 
 def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -> None:

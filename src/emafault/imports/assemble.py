@@ -8,9 +8,9 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from ..io.recording import PHASES, Recording
+from ..units import quantity
 from .loading import Raw
 from .signal import Signal, pulse_uncertainty, pulses
-from .units import quantity
 from .voltages import phase_signals, swept, with_modelled_star
 from .windows import span
 

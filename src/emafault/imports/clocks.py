@@ -130,7 +130,7 @@ def clocks(recordings: Sequence[Raw], given, star, actuator: ActuatorParameters,
             if clock == "found":
                 out.append(align(raw, logger, first, star, actuator, interval))
             else:
-                from .units import quantity
+                from ..units import quantity
 
                 skew = quantity(clock["skew"], "s", f"loggers.{logger}.clock.skew")
                 raw.change(lambda s: s.on_clock(skew, clock.get("drift", 0.0)) if s.logger == logger else s)  # noqa: B023

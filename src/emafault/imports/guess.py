@@ -7,9 +7,9 @@ from typing import Any
 
 import yaml
 
+from ..units import registry, spelt
 from .mapping import BLANK
 from .readers import read_raw
-from .units import registry, spelt
 
 HEADER = """\
 # Guessed from the names and units of channels: look it over, and fill in every ??? .

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.recording import VARIABLES
+from ..units import factor, quantity
 from .hall import angle_of_halls
 from .mapping import PHASED
 from .readers import read_raw
 from .signal import Signal
-from .units import factor, quantity
 
 
 @dataclass

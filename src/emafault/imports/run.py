@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..io.bench import check_bench
 from ..io.recording import Recording, write_recording
 from ..io.sensors import refuse_mistaken
 from ..places import refuse_folder, refuse_output
+from ..units import quantity
 from . import phases, probes
 from .assemble import recording_of
 from .clocks import clocks
@@ -22,7 +23,6 @@ from .finding import LEAST_MARGIN, Finding
 from .loading import Raw, load
 from .mapping import read_map
 from .motion import senses, turn_round
-from .units import quantity
 from .voltages import floating_legs, star_part, swept, terminals_from_duty, with_modelled_star
 from .windows import windows_of
 from .zero import Electrical, fit
@@ -172,7 +172,9 @@ def import_bench(
         ]
         source = {"source": " ".join(Path(p).name for p in entry["files"].values()), "source_sha256": " ".join(digests)}
         recording = result.recordings[name]
-        attributes = recording.attributes | source | {"import_map": json.dumps(plain, sort_keys=True)}
+        attributes = recording.attributes | source | {
+            "import_map": json.dumps(plain, sort_keys=True), "actuator": json.dumps(asdict(actuator)),
+        }  # fmt: skip
         write_recording(folder / name, replace(recording, attributes=attributes))
     draw(result, plain).write(folder / PAGE)
     return result

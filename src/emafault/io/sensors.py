@@ -8,6 +8,7 @@ import numpy as np
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
+from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 
 SLOWEST_INTERVAL = 1e-3  # s
@@ -25,6 +26,7 @@ FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
+OF_SPEED, OF_GEAR = (0.4, 2.5), (0.85, 1.18)  # slopes with which signals that are one quantity may go together
 TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
 
 
@@ -38,6 +40,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     ------
     InputError : naming the file, the variable and what contradicts it
     """
+    refuse_other_actuator(path, recording, actuator)
     ambient = recording.ambient_temperature
     if not TEMPERATURES[0] <= ambient <= TEMPERATURES[1]:
         low, high = TEMPERATURES
@@ -46,6 +49,8 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         dead = np.flatnonzero(np.ptp(getattr(recording, variable), axis=0) == 0.0)
         if len(dead):
             raise InputError(f"{path}: {variable} of phase {PHASES[dead[0]]} never changes; the channel is dead")
+    refuse_frozen(path, recording, actuator)
+    refuse_bus(path, recording, actuator)
     theta = recording.rotor_angle - recording.rotor_angle[0]
     travel = float(np.ptp(theta))
     if travel > 1.0:
@@ -55,7 +60,12 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
     if travel > 5.0:
         by_shaft = actuator.gear_ratio * (recording.output_position - recording.output_position[0])
         _refuse_unlike(
-            path, "output_position", f"rotor_angle over the gear ratio {actuator.gear_ratio:g}", theta, by_shaft
+            path,
+            "output_position",
+            f"rotor_angle over the gear ratio {actuator.gear_ratio:g}",
+            theta,
+            by_shaft,
+            OF_GEAR,
         )
         by_rotor = theta / actuator.gear_ratio
         of_shaft, of_command = (
@@ -70,14 +80,19 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         if order is not None and order != (0, 1, 2):
             raise InputError(f"{path}: phase_current_end has its phases in another order than phase_current")
     if travel * actuator.pole_pairs > 4 * np.pi:
+        whole = not any(clipped(recording))  # what is cut off says nothing of units
+        if whole:
+            refuse_unbalanced(path, recording)
         _refuse_swapped_phases(path, recording, actuator)
+        if whole:
+            refuse_implausible(path, recording, actuator)
 
 
-def _follows(wanted: np.ndarray, got: np.ndarray) -> tuple[bool, float, float]:
+def _follows(wanted: np.ndarray, got: np.ndarray, slopes: tuple[float, float] = OF_SPEED) -> tuple[bool, float, float]:
     """Whether ``got`` goes with ``wanted``: slope near one and alike; both figures."""
     slope = float(wanted @ got / max(wanted @ wanted, 1e-30))
     likeness = float(np.corrcoef(wanted, got)[0, 1]) if np.ptp(got) > 0 else 0.0
-    return likeness >= 0.8 and 0.4 < slope < 2.5, slope, likeness
+    return likeness >= 0.8 and slopes[0] < slope < slopes[1], slope, likeness
 
 
 def _alike_but_for_drift(wanted: np.ndarray, got: np.ndarray, interval: float) -> bool:
@@ -90,9 +105,11 @@ def _alike_but_for_drift(wanted: np.ndarray, got: np.ndarray, interval: float) -
     return bool(abs(drift) < DRIFT and np.ptp(bent) > BENT and _follows(bent, other)[0])
 
 
-def _refuse_unlike(path: str, variable: str, what: str, wanted: np.ndarray, got: np.ndarray) -> None:
+def _refuse_unlike(
+    path: str, variable: str, what: str, wanted: np.ndarray, got: np.ndarray, slopes: tuple[float, float] = OF_SPEED
+) -> None:
     """Refuse ``got`` unless it follows ``wanted`` with a slope near one."""
-    follows, slope, likeness = _follows(wanted, got)
+    follows, slope, likeness = _follows(wanted, got, slopes)
     if not follows:
         raise InputError(
             f"{path}: {variable} is not {what} (slope {slope:.2g}, correlation {likeness:.2f}); "

@@ -2,6 +2,7 @@
 
 A file defines the hooks it needs, each a term of one equation written for ``Dual`` values, and may state
 
+``SCALES``   what the numbers of a parameter scale with from actuator to actuator (see ``effects.scaling``)
 ``SHAPES``   values of its parameters at which a secant is taken where no derivative at "off" exists
 ``WIDTHS``   prior standard deviation of a parameter where it is not 0.6 of its range
 ``SENTENCE`` what the effect is, as the page says it

@@ -2,35 +2,42 @@
 
 import numpy as np
 
+from ...effects.scaling import scale
 from ..flexible import flexible_shaft
 
 SENTENCE = "the transmission is flexible"
 PARAMETERS = {"flexibility": (0.0, 1.5e-4, 1.2e-4), "C": (300.0, 300.0, 60.0)}
+SCALES = {"flexibility": "shaft_flexibility", "C": "shaft_torque"}
 SHAPES = ({"flexibility": 6e-5, "C": 300.0}, {"flexibility": 1.3e-4, "C": 300.0}, {"flexibility": 3e-4, "C": 300.0})
 GROUND = 2.0  # N m s/rad from the user shaft to ground
 SHARE = 0.3  # of the inertia behind the stiffness
-STIFFEST = 2e-5  # rad/(N m)
+STIFFEST = 2e-5  # rad/(N m), of the reference actuator
 KEPT = 12  # solutions of a recording
 
 
-def solve(rec, flexibility, damping, play, scale):
+def solve(rec, flexibility, damping, play, inertia):
     """User angle (rad) and torque on the motor (N m) along the measured rotor angle.
 
-    ``scale`` of this unit's inertia, which the user shaft has its share of.
+    ``inertia``: factor of this unit's, which the user shaft has its share of.
     """
     a = rec.actuator
-    if flexibility < STIFFEST:
+    if flexibility < _stiffest(rec):
         return None
-    J = SHARE * scale * a.inertia * a.gear_ratio**2
+    J = SHARE * inertia * a.inertia * a.gear_ratio**2
     position, torque = flexible_shaft(
         rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
     )
     return position, torque / a.gear_ratio
 
 
-def rotor_share(p):
+def _stiffest(rec):
+    """Flexibility (rad/(N m)) below which the shaft is taken for rigid."""
+    return scale("shaft_flexibility", rec.actuator) * STIFFEST
+
+
+def rotor_share(p, rec):
     """Share of the inertia that turns with the rotor."""
-    return 1.0 - SHARE if p("flexibility").value >= STIFFEST else 1.0
+    return 1.0 - SHARE if p("flexibility").value >= _stiffest(rec) else 1.0
 
 
 def twist(p, rec, rigid, play):
@@ -44,13 +51,15 @@ def torque(p, rec):
 
 
 def _dual(p, rec, which, rigid, play):
-    flexibility, damping, scale = p("flexibility"), p("C"), rec.inertia_scale
-    given = flexibility.value, damping.value, play, scale.value
+    flexibility, damping, inertia = p("flexibility"), p("C"), rec.inertia_scale
+    given = flexibility.value, damping.value, play, inertia.value
     base = _solved(rec, *given)
     if base is None:
         return rigid if rigid is not None else flexibility.through(0.0, 0.0)
     out = flexibility.through(np.asarray(base[which]), 0.0)
-    for parameter, m, step in ((flexibility, 0, 1e-6), (damping, 1, 5.0), (scale, 3, 0.01)):
+    own = rec.actuator
+    steps = 1e-6 * scale(SCALES["flexibility"], own), 5.0 * scale(SCALES["C"], own), 0.01
+    for parameter, m, step in zip((flexibility, damping, inertia), (0, 1, 3), steps, strict=True):
         if parameter.slopes:
             there = _solved(rec, *(x + step if k == m else x for k, x in enumerate(given)))
             out = out + parameter.through(0.0, (there[which] - base[which]) / step)

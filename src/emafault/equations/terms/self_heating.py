@@ -6,6 +6,7 @@ from ..first_order import followed
 
 SENTENCE = "the winding heats by its own loss"
 PARAMETERS = {"heating_rate": (0.0, 0.0, 0.15), "Rth": (3.0, 3.0, 1.2)}
+SCALES = {"heating_rate": "inverse_loss", "Rth": "inverse_loss"}
 
 
 def heating(p, rec, loss):

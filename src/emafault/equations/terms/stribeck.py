@@ -4,6 +4,7 @@ import numpy as np
 
 SENTENCE = "the friction falls with speed (Stribeck)"
 PARAMETERS = {"a": (0.0, 0.0, 0.018), "log_w_s": (1.8, 1.8, 0.7)}
+SCALES = {"a": "motor_torque"}
 SHAPES = ({"a": 0.01, "log_w_s": 0.9}, {"a": 0.01, "log_w_s": 1.8}, {"a": 0.01, "log_w_s": 2.7})
 
 

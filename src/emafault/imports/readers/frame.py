@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from ..units import factor
+from ...units import factor
 from . import dataset
 
 _WITH_UNIT = re.compile(r"^\s*(.*?)\s*[\[(]\s*([^\[\]()]*)\s*[\])]\s*$")

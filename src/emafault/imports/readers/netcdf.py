@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..units import factor
+from ...units import factor
 from . import dataset
 from .frame import is_time
 

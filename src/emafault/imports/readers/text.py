@@ -106,7 +106,7 @@ def _bare(text: str) -> str:
 
 def _are_units(row: list[str], width: int) -> bool:
     """Whether a line under the names holds units: bracketed, or all of them known."""
-    from ..units import is_unit
+    from ...units import is_unit
 
     said = [cell for cell in row if cell]
     return bool(said) and all(cell[0] in "([" or not _bare(cell) or is_unit(_bare(cell)) for cell in said)

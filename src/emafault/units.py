@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 
-from ..errors import InputError
+from .errors import InputError
 
 #: what loggers write that pint does not know, or takes for something else
 _SPELT = {
@@ -23,7 +23,7 @@ def registry():
     try:
         import pint
     except ImportError as error:
-        raise InputError("an import needs pint, which emafault[import] installs") from error
+        raise InputError("pint is needed to read units; pip install pint") from error
     return pint.UnitRegistry()
 
 
