@@ -48,14 +48,14 @@ def diagnose_folder(
     InputError : recordings or effects that cannot be used, or results that cannot be written
     """
     name = bench_name(path)
-    folder = Path(out) if out is not None else results_folder() / "diagnoses" / file_name(name)
+    folder = Path(out) if out is not None else folder_of(name)
     refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
     if corrected is not None:
         new_folder(path, corrected, "--corrected")
     bench, found = diagnosed(path, spec, exclude)
     verdict = found.verdict
     with aside(track) as tracked:
-        _write(found, bench, folder, experiment)
+        write(found, bench, folder, experiment)
         if corrected is not None:
             undone = write_corrected(found, bench.recordings, path, corrected)
             print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
@@ -71,16 +71,38 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     ------
     InputError : recordings or effects that cannot be used
     """
-    actuator = ActuatorParameters(**spec["actuator"])
-    bench = read_bench(path, actuator)
-    split = split_bench(bench.recordings)
-    found = diagnose(bench.name, bench.recordings, split, actuator, SensorNoise(**spec["sensors"]), exclude, PROCESSES)
-    found.verdict["warnings"] = bench.warnings
+    bench = read_bench(path, ActuatorParameters(**spec["actuator"]))
+    found = diagnose_bench(bench, spec, exclude)
     print("\n".join(finding(found.verdict)), flush=True)
     return bench, found
 
 
-def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None) -> None:
+def diagnose_bench(bench: Bench, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> Diagnosed:
+    """Diagnose recordings that have been read and checked.
+
+    Parameters
+    ----------
+    spec : ``actuator`` and ``sensors`` of a composed configuration
+    exclude : effects that the library is to lack
+
+    Raises
+    ------
+    InputError : an effect that does not exist
+    """
+    actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
+    split = split_bench(bench.recordings)
+    found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES)
+    found.verdict["warnings"] = bench.warnings
+    return found
+
+
+def folder_of(bench: str) -> Path:
+    """Folder that the diagnosis of a bench is written to unless another is named."""
+    return results_folder() / "diagnoses" / file_name(bench)
+
+
+def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None = None) -> None:
+    """Write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``, the last also to ``experiment``."""
     verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
     text = experiment_text(verdict, verdict["simulator"]["after"], f"diagnosed_{file_name(bench.name)}")

@@ -1,0 +1,45 @@
+"""The nominal actuator that recordings are compared with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from .. import config
+from ..actuator.parameters import ActuatorParameters
+from ..actuator.sensors import SensorNoise
+from .table import Table
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """The nominal actuator and what its sensors' noise is where recordings do not tell it."""
+
+    parameters: ActuatorParameters
+    sensors: SensorNoise
+    spec: Mapping[str, Any] = field(repr=False, compare=False)  # as composed, for diagnosing and planning
+
+    @classmethod
+    def reference(cls, *overrides: str, **numbers: float) -> "Actuator":
+        """The reference actuator, or one that differs from it.
+
+        Parameters
+        ----------
+        overrides : Hydra overrides as those of the command line, as ``"sensors.voltage=0.1"``
+        numbers : values of the actuator (SI), as ``gear_ratio=400``; ``conf/actuator/reference.yaml`` lists them
+
+        Raises
+        ------
+        InputError : a number that there is not, or a value that is impossible
+        """
+        texts = [*overrides, *(f"actuator.{name}={value}" for name, value in numbers.items())]
+        config.refuse_unread(texts, ("actuator", "sensors"), "Actuator")
+        spec = config.diagnosis_spec(config.compose(overrides=texts))
+        return cls(ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"]), spec)
+
+    def table(self) -> Table:
+        """A row a number of the actuator, in SI units."""
+        rows = [[f.name, getattr(self.parameters, f.name)] for f in fields(self.parameters)]
+        return Table(["parameter", "value"], rows)
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
