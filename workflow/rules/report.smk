@@ -103,6 +103,7 @@ rule track_evaluation:
         histories=histories,
         search=search_results,
         model=rules.export_network.output.model,
+        exported=exported_network,
         report=rules.draw_report.output.report,
         figures=rules.draw_report.output.figures,
         configuration=rules.write_configuration.output,
@@ -117,6 +118,7 @@ rule track_evaluation:
         runtime=10,
     params:
         spec=whole_configuration,
+        data=data_of_case,
         code=code("track_evaluation"),
     script:
         "../scripts/track_evaluation.py"

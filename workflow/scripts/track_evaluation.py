@@ -14,5 +14,7 @@ with one_line_errors(snakemake.log[0]):
         given.histories,
         given.search,
         files,
+        (given.model, given.exported[0]),
+        snakemake.params.data,
         snakemake.output[0],
     )

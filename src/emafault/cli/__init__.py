@@ -21,6 +21,7 @@ COMMANDS = {
     "diagnose": "say where a simulator and a bench disagree, which effect causes it and how far it explains it",
     "plan": "say what to record next on a bench, and write the motions for it to play",
     "demo": "diagnose the bench in the box and open its page",
+    "runs": "open MLflow on what was logged, with the columns that one compares",
     "config": "print a composed configuration, with where each value comes from",
     "schema": "print the JSON Schema of a file that emafault writes or reads",
     "completion": "print the completion script of a shell",

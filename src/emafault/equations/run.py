@@ -60,7 +60,7 @@ def diagnose_folder(
             undone = write_corrected(found, bench.recordings, path, corrected)
             print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
         print(f"written to {folder}", flush=True)
-        tracked(spec["tracking"], folder, verdict)
+        tracked(spec["tracking"], folder, verdict, finding(verdict), path)
     return verdict
 
 
