@@ -41,12 +41,12 @@ def moved(tmp_path_factory, network):
     entry = Entry(
         "mine",
         {"network": {"width": 6}},
-        {"dT_error": 0.3},
+        {"error_dT_K": 0.3},
         {"curve.train": [3.0, 2.0, 1.0]},
         {"tables/metrics.json": {"metric": ["dT.mae", "dT.bias"], "mean": [0.3, float("nan")]}},
         note="dT to 0.3 K",
         data=[Data("paper/training", "0123456789abcdef", "results/datasets/paper/training", "training", 600)],
-        network=Network(network, {"estimator": "network"}, {"network_dT": 0.4}),
+        network=Network(network, {"estimator": "network"}, {"network_dT_K": 0.4}),
         files={report: ""},
     )
     run = log_run(f"sqlite:///{before}/mlflow.db", "emafault", entry)
@@ -79,9 +79,9 @@ def test_a_run_has_its_data_its_description_and_its_network_with_a_signature(mov
     (used,) = found.inputs.dataset_inputs
     assert (used.dataset.name, used.dataset.digest) == ("paper/training", "0123456789abcdef")
     assert [(t.key, t.value) for t in used.tags] == [("mlflow.data.context", "training")]
-    assert found.data.metrics == {"dT_error": 0.3, "curve.train": 1.0, "network_dT": 0.4}
+    assert found.data.metrics == {"error_dT_K": 0.3, "curve.train": 1.0, "network_dT_K": 0.4}
     (logged,) = client.search_logged_models([found.info.experiment_id])
-    assert [(m.key, m.value) for m in logged.metrics] == [("network_dT", 0.4)] and logged.source_run_id == run
+    assert [(m.key, m.value) for m in logged.metrics] == [("network_dT_K", 0.4)] and logged.source_run_id == run
     before = mlflow.get_tracking_uri()
     mlflow.set_tracking_uri(uri)
     try:

@@ -116,7 +116,7 @@ def test_the_evaluation_is_tracked_with_its_trials_below(house):
             ).fetchall()
         )
     assert runs[tracked["run_id"]] == "smoke" and children == 6
-    assert metrics["dT_error"] < 0.5 < 1.0 < metrics["paper_dT"] and len(metrics) <= 20
+    assert metrics["error_dT_K"] < 0.5 < 1.0 < metrics["paper_dT_K"] and len(metrics) <= 20
     artifacts = house / "results" / "mlflow_artifacts" / tracked["run_id"] / "artifacts"
     assert (artifacts / "model" / "network.onnx").is_file() and (artifacts / "figures" / "figure_2.png").is_file()
     table = json.loads((artifacts / "tables" / "metrics.json").read_text())

@@ -8,7 +8,8 @@ from ..plain import read_json
 from ..tracking import Data, Entry, Network, ensure_experiment, log_run
 from .networks import folders, write_json
 
-OUTPUTS = {"dT": "dT (K)", "N": "N", "xi": "xi"}
+#: outputs with the units that their errors are logged in: MLflow compares runs by three decimals
+OUTPUTS = {"dT": ("K", 1.0), "N": ("pct", 100.0), "xi": ("pct", 100.0)}
 
 
 def prepare_tracking(spec: Mapping[str, Any], output: str) -> None:
@@ -80,45 +81,50 @@ def track_evaluation(
 def headline(table: Mapping[str, Any], best: Mapping[str, Any]) -> dict[str, float]:
     """The figures that experiments are compared by.
 
-    Mean absolute errors (dT in K) of the best estimator on fresh runs, ``calibrated_`` once a unit is calibrated, at
-    the ``bound`` beside it, and of the ``paper``'s method with its network; coverage of the intervals, error over range
-    and number of weights of the best.
+    Mean absolute errors (dT in K, N and xi in %) of the best estimator on fresh runs, ``calibrated`` once a unit is
+    calibrated, at the ``bound`` beside it, and of the ``paper``'s method with its network; coverage of the intervals,
+    error over range and number of weights of the best.
     """
-    values = {f"{output}_error": best["all"][f"errors.{output}.mae"]["mean"] for output in OUTPUTS}
-    values |= {
+    values = _errors("error", best["all"]) | {
         "coverage": best["all"]["coverage.mean"]["mean"],
-        "over_range": best["all"]["errors.mean.over_range"]["mean"],
+        "over_range_pct": 100.0 * best["all"]["errors.mean.over_range"]["mean"],
         "weights": best["parameters"],
     }
     if "all_calibrated" in best:
-        values |= {f"calibrated_{o}": best["all_calibrated"][f"errors.{o}.mae"]["mean"] for o in OUTPUTS}
+        values |= _errors("calibrated", best["all_calibrated"])
     bound = table["bound"].get(best["bound"])
-    values |= {f"bound_{output}": bound[output] for output in OUTPUTS} if bound else {}
+    values |= {f"bound_{output}_{unit}": scale * bound[output] for output, (unit, scale) in OUTPUTS.items() if bound}
     for entry in table["results"]:
         if (entry["method"], entry["estimator"]) == ("paper", "network"):
-            values |= {f"paper_{output}": entry["all"][f"errors.{output}.mae"]["mean"] for output in OUTPUTS}
+            values |= _errors("paper", entry["all"])
     return values
+
+
+def _errors(name: str, results: Mapping[str, Any]) -> dict[str, float]:
+    """Mean absolute errors by output, named with their unit."""
+    return {
+        f"{name}_{output}_{unit}": scale * results[f"errors.{output}.mae"]["mean"]
+        for output, (unit, scale) in OUTPUTS.items()
+    }
 
 
 def _note(question: str, best: Mapping[str, Any], values: Mapping[str, float]) -> str:
     """Description of a run: the headline figures as a table."""
-    rows = {f"best: {best['method']}/{best['estimator']}": "{}_error", "the same, unit calibrated": "calibrated_{}",
-            "Cramér-Rao bound": "bound_{}", "the paper's method": "paper_{}"}  # fmt: skip
-    lines = [f"| mean absolute error | {' | '.join(OUTPUTS.values())} |", f"|---|{'---|' * len(OUTPUTS)}"]
-    for label, key in rows.items():
-        cells = [values.get(key.format(output)) for output in OUTPUTS]
+    rows = {"error": f"best: {best['method']}/{best['estimator']}", "calibrated": "the same, unit calibrated",
+            "bound": "Cramér-Rao bound", "paper": "the paper's method"}  # fmt: skip
+    lines = ["| mean absolute error | dT (K) | N (%) | xi (%) |", "|---|---|---|---|"]
+    for name, words in rows.items():
+        cells = [values.get(f"{name}_{output}_{unit}") for output, (unit, _) in OUTPUTS.items()]
         if None not in cells:
-            lines.append(f"| {label} | {' | '.join(f'{cell:.3g}' for cell in cells)} |")
-    covered = f"90 % intervals cover {values['coverage']:.3f}." if "coverage" in values else ""
-    return "\n".join([question, "", *lines, "", covered])
+            lines.append(f"| {words} | {' | '.join(f'{cell:.3g}' for cell in cells)} |")
+    return "\n".join([question, "", *lines, "", f"Its intervals cover {values['coverage']:.3f}."])
 
 
 def _network(path: str, history: str, table: Mapping[str, Any]) -> Network:
     """The exported network with its own errors."""
     method, estimator = Path(history).parts[-3:-1]
     own = next(e["all"] for e in table["results"] if (e["method"], e["estimator"]) == (method, estimator))
-    errors = {f"network_{output}": own[f"errors.{output}.mae"]["mean"] for output in OUTPUTS}
-    return Network(path, {"reconstruction": method, "estimator": estimator}, errors)
+    return Network(path, {"reconstruction": method, "estimator": estimator}, _errors("network", own))
 
 
 def _every_metric(table: Mapping[str, Any]) -> dict[str, list]:
@@ -152,7 +158,7 @@ def _shown_curves(curves: Mapping[tuple[str, str, str], list[float]], results: S
     """Those of the best network."""
     error = {(e["method"], e["estimator"]): e["all"]["errors.mean.over_range"]["mean"] for e in results}
     best = min({key[:2] for key in curves}, key=lambda key: error.get(key, float("inf")), default=None)
-    return {f"curve.{key[2]}": values for key, values in curves.items() if key[:2] == best}
+    return {f"learning.{key[2]}": values for key, values in curves.items() if key[:2] == best}
 
 
 def _as_columns(curves: Mapping[tuple[str, str, str], list[float]]) -> dict[str, list]:

@@ -42,9 +42,18 @@ class Experiment:
 STUDIES = Experiment(
     "",
     "Evaluated experiments, a run each; the trials of its search are nested below. Errors are mean absolute ones on "
-    "fresh runs, dT in K; `bound` is the same at the Cramér-Rao bound, `paper` the paper's method, "
+    "fresh runs, dT in K, N and xi in %; `bound` is the same at the Cramér-Rao bound, `paper` the paper's method, "
     "`network` the exported network.",
-    ("dT_error", "N_error", "xi_error", "coverage", "bound_dT", "bound_N", "bound_xi", "paper_dT"),
+    (
+        "error_dT_K",
+        "error_N_pct",
+        "error_xi_pct",
+        "coverage",
+        "bound_dT_K",
+        "bound_N_pct",
+        "bound_xi_pct",
+        "paper_dT_K",
+    ),
     ("magnet.coefficient", "command.name", "sampling.runs"),
     ("best",),
 )
