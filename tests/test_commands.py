@@ -69,7 +69,7 @@ def test_a_shell_completes_commands_and_options(tmp_path, capsys):
     [
         (["config", "magnet=tin"], "magnet: got 'tin'"),
         (["config", "--experiment", "nothing"], "experiment: got 'nothing'"),
-        (["schema", "poem"], "accepted are map, verdict"),
+        (["schema", "poem"], "schema: got 'poem', accepted are"),
         (["demo", "--out", "{folder}"], "is not of a diagnosis of this bench"),
     ],
 )

@@ -2,12 +2,16 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
+
+import emafault
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -22,6 +26,12 @@ def installed(tmp_path_factory):
     with zipfile.ZipFile(wheel) as packed:
         packed.extractall(folder / "site")
     return folder / "site"
+
+
+def test_the_version_is_the_cited_and_the_last_one():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["version"] == emafault.__version__ and cited["license"] == "BSD-3-Clause"
+    assert re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[0] == emafault.__version__
 
 
 def test_a_wheel_brings_what_it_reads(installed, tmp_path):

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Any
@@ -112,7 +113,7 @@ def _is_experiment(path: Path) -> bool:
 def aside(track: bool) -> Iterator[Callable[..., None]]:
     """Gives ``log_diagnosis``, done in a process of its own, which loads what it needs meanwhile; nothing without
     ``track``."""
-    if not track:
+    if not track or find_spec("mlflow") is None:
         yield lambda *_: None
         return
     if "fork" not in get_all_start_methods():
@@ -152,7 +153,9 @@ def log_diagnosis(
 def _failure(
     tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any], sentences: Sequence[str], source: str | Path
 ) -> str:
-    """Log it; what went wrong, or nothing."""
+    """Log it, where MLflow is installed; what went wrong, or nothing."""
+    if find_spec("mlflow") is None:
+        return ""
     try:
         from ..tracking import log_run
         from ..tracking.diagnosis import entry_of
