@@ -1,12 +1,17 @@
-"""The wheel by itself: it brings its configuration and needs no clone."""
+"""The wheel by itself: it brings what it reads and needs no clone; ``.ci/wheel`` installs and uses it."""
 
+import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
+
+import emafault
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -23,21 +28,28 @@ def installed(tmp_path_factory):
     return folder / "site"
 
 
-def test_a_wheel_simulates_and_identifies_from_any_folder(installed, tmp_path):
+def test_the_version_is_the_cited_and_the_last_one():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert cited["version"] == emafault.__version__ and cited["license"] == "BSD-3-Clause"
+    assert re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[0] == emafault.__version__
+
+
+def test_a_wheel_brings_what_it_reads(installed, tmp_path):
+    package = installed / "emafault"
+    for tree in ("conf", "examples/bench"):
+        ours = package / ("example" if tree == "examples/bench" else tree)
+        files = {p.relative_to(ROOT / tree) for p in (ROOT / tree).rglob("*") if p.is_file()}
+        assert {p.relative_to(ours) for p in ours.rglob("*") if p.is_file()} == files and files
+    assert (package / "py.typed").is_file() and (package / "__init__.pyi").is_file()
+
     def run(*arguments):
-        environment = os.environ | {"PYTHONPATH": str(installed)}
         command = [sys.executable, "-m", "emafault", *arguments]
+        environment = os.environ | {"PYTHONPATH": str(installed)}
         return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
 
-    where = subprocess.run(
-        [sys.executable, "-c", "import emafault.paths as p; print(p.CONF)"], cwd=tmp_path, text=True,
-        env=os.environ | {"PYTHONPATH": str(installed)}, capture_output=True, check=True,
-    )  # fmt: skip
-    assert where.stdout.strip() == str(installed / "emafault" / "conf")
-    done = run("simulate", "a.nc", "command=sine", "recording.duration=0.5", "--fault", "dT=30")
-    assert done.returncode == 0, done.stderr
-    done = run("identify", "a.nc")
-    assert done.returncode == 0 and "dT" in done.stdout, done.stderr
     assert run("--version").stdout.startswith("emafault 0.")
+    assert json.loads(run("schema", "verdict").stdout)["title"].startswith("diagnosis.json")
+    done = run("config", "--plain", "command=sine")
+    assert done.returncode == 0 and "name: sine" in done.stdout, done.stderr
     done = run("plan", "nowhere")
     assert (done.returncode, done.stderr) == (2, "emafault plan: nowhere: no such file or folder\n")

@@ -116,9 +116,12 @@ def test_the_evaluation_is_tracked_with_its_trials_below(house):
             ).fetchall()
         )
     assert runs[tracked["run_id"]] == "smoke" and children == 6
-    assert metrics["weighted_floating.closed_form.all.dT.mae"] < 0.5
+    assert metrics["error_dT_K"] < 0.5 < 1.0 < metrics["paper_dT_K"] and len(metrics) <= 20
     artifacts = house / "results" / "mlflow_artifacts" / tracked["run_id"] / "artifacts"
     assert (artifacts / "model" / "network.onnx").is_file() and (artifacts / "figures" / "figure_2.png").is_file()
+    table = json.loads((artifacts / "tables" / "metrics.json").read_text())
+    assert ["weighted_floating", "closed_form", "all", "errors.dT.mae"] in [row[:4] for row in table["data"]]
+    assert list((artifacts.parents[1] / "models").rglob("MLmodel"))
 
 
 def test_a_rerun_does_nothing(house):

@@ -1,5 +1,5 @@
-"""Where configuration and results are: of a clone beside the sources, of an installed package in it and in the working
-folder."""
+"""Where configuration, example and results are: of a clone beside the sources, of an installed package in it and in the
+working folder."""
 
 import os
 from pathlib import Path
@@ -12,6 +12,7 @@ _CLONED = (_CLONE / "conf" / "config.yaml").is_file()
 
 CONF = _CLONE / "conf" if _CLONED else PACKAGE / "conf"
 EFFECTS = CONF / "effect"
+EXAMPLE = _CLONE / "examples" / "bench" if _CLONED else PACKAGE / "example"
 
 
 def results_folder() -> Path:

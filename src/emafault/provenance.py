@@ -35,6 +35,17 @@ def claim(folder: str | Path) -> None:
         raise InputError(f"{folder}: another run is at work there, wait until it has ended") from None
 
 
+def digest_of(*values: object) -> str:
+    """Digest of plain values, the same for the same ones."""
+    return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def file_digest(path: str | Path) -> str:
+    """Digest of what a file holds."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
 @functools.cache
 def source_digest(script: str | Path) -> str:
     """Digest of a script and of every module of this package that it imports, directly or not.

@@ -104,7 +104,7 @@ def test_a_diagnosis_is_tracked_and_a_tracker_that_fails_breaks_nothing(tmp_path
     from mlflow import MlflowClient
 
     client = MlflowClient(tracking_uri=uri)
-    (run,) = client.search_runs([client.get_experiment_by_name("emafault").experiment_id])
+    (run,) = client.search_runs([client.get_experiment_by_name("emafault-diagnoses").experiment_id])
     assert run.info.run_name == "single" and run.data.params["verdict"] == verdict["verdict"]
     broken = spec | {"tracking": {"uri": "sqlite:////proc/nowhere/x.db", "experiment": "emafault"}}
     diagnose_folder(tmp_path / "single", broken, tmp_path / "out")

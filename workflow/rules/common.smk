@@ -210,6 +210,21 @@ def title_and_question(wildcards):
     return {"title": wildcards.case, "question": composed(wildcards)["question"]}
 
 
+def data_of_case(wildcards):
+    """What MLflow is told of the data sets of a case; equal digests are of equal numbers."""
+    case, simulated = PLAN.case(wildcards.case), code("simulate_shard")
+    return [
+        {
+            "name": f"{name}/{part}",
+            "digest": provenance.digest_of(PLAN.dataset(name, part), simulated),
+            "source": f"{RESULTS}/datasets/{name}/{part}",
+            "context": {"training": "training", "fresh": "evaluation", "reference": "calibration"}[part],
+            "rows": PLAN.dataset(name, part)["runs"],
+        }
+        for part, name in case.datasets.items()
+    ]
+
+
 # --- benches and blind cases ---
 
 BENCH = str(config.get("bench", "")).rstrip("/")

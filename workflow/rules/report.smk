@@ -114,6 +114,7 @@ rule track_evaluation:
         search=search_results,
         model=rules.export_network.output.model,
         source=rules.export_network.output.source,
+        exported=exported_network,
         report=rules.draw_report.output.report,
         figures=rules.draw_report.output.figures,
         configuration=rules.write_configuration.output,
@@ -130,6 +131,7 @@ rule track_evaluation:
         runtime=more(10),
     params:
         spec=whole_configuration,
+        data=data_of_case,
         code=code("track_evaluation"),
     script:
         "../scripts/track_evaluation.py"

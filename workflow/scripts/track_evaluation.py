@@ -21,5 +21,7 @@ with one_line_errors(snakemake.log[0]):
         histories_in(given.estimators),
         given.search,
         files,
+        (given.model, given.exported[0]),
+        snakemake.params.data,
         snakemake.output[0],
     )

@@ -4,8 +4,8 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Collection, Sequence
+from typing import Any, NoReturn
 
 from ..errors import InputError, one_line, shown
 
@@ -21,6 +21,11 @@ COMMANDS = {
     "diagnose": "say where a simulator and a bench disagree, which effect causes it and how far it explains it",
     "plan": "say what to record next on a bench, and write the motions for it to play",
     "actuator": "compose the file of one's own actuator, identify its numbers in healthy recordings, or export them",
+    "demo": "diagnose the bench in the box and open its page",
+    "runs": "open MLflow on what was logged, with the columns that one compares",
+    "config": "print a composed configuration, with where each value comes from",
+    "schema": "print the JSON Schema of a file that emafault writes or reads",
+    "completion": "print the completion script of a shell",
 }
 
 
@@ -38,18 +43,23 @@ def whole_number(text: str) -> int:
     return int(text)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a subcommand; 0 if it did what was asked, 2 with one line on refused input, 1 on a fault of the program."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    parser = _Parser(prog="emafault", description=importlib.import_module("emafault").__doc__)
-    parser.add_argument(
-        "--version", action="version", version=f"emafault {importlib.import_module('emafault').__version__}"
-    )
+def parser_of(commands: Collection[str]) -> tuple[argparse.ArgumentParser, Any]:
+    """The parser and its subparsers, with the arguments of these commands, whose modules are imported for them."""
+    package = importlib.import_module("emafault")
+    parser = _Parser(prog="emafault", description=package.__doc__)
+    parser.add_argument("--version", action="version", version=f"emafault {package.__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="{" + ",".join(COMMANDS) + "}")
     for name, text in COMMANDS.items():
         sub = subparsers.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-        if name in given[:1]:
+        if name in commands:
             importlib.import_module(f"{__name__}.{name}").arguments(sub)
+    return parser, subparsers
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a subcommand; 0 if it did what was asked, 2 with one line on refused input, 1 on a fault of the program."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    parser, subparsers = parser_of(given[:1])
     args, rest = parser.parse_known_args(given)
     if rest and (not hasattr(args, "overrides") or any(word.startswith("-") for word in rest)):
         subparsers.choices[args.command].error(f"unrecognized arguments: {shown(' '.join(rest))}")

@@ -83,11 +83,11 @@ def identified(bench: str | Path, corrected: str | Path, actuator: str | None = 
 
     By what ``emafault identify`` uses unless told otherwise; a recording that determines no fault vector is left out.
     """
+    from ..api.model import load_model
     from ..errors import InputError
     from ..faults import FAULT_NAMES
     from ..identification.recordings import identify_recordings
     from ..io.recording import read_recording, recordings_in
-    from .model import load_model
 
     model = load_model("paper", actuator=actuator)
     originals = {path.name: path for path in recordings_in([bench])}

@@ -3,9 +3,13 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import shown
 from .machine import add_actuator
+
+if TYPE_CHECKING:
+    from ..api.identification import Identification
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,13 +47,10 @@ def run(args: argparse.Namespace) -> None:
     ------
     InputError : recordings, a reference, an experiment or a method that cannot be used
     """
-    import json
-
-    from ..identification.recordings import identify_recordings
-    from ..io.atomic import write_text
+    from ..api.identification import identify
+    from ..api.recordings import Recordings
     from ..io.recording import read_recording, recordings_in
     from ..places import refuse_output
-    from .model import load_model
 
     paths, healthy = recordings_in(args.files), recordings_in(args.reference)
     if args.json is not None:
@@ -57,18 +58,12 @@ def run(args: argparse.Namespace) -> None:
     if args.diagnosis is not None:
         _of_diagnosis(args, paths)
         return
-    model = load_model(args.experiment, args.method, args.results, args.actuator)
-    reference = [read_recording(path) for path in healthy]
-    found = identify_recordings(model, [read_recording(path) for path in paths], reference, args.level)
-    result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
-    print(table(result, args.level))
-    unit = f"calibrated on {len(reference)} healthy recording(s)" if reference else "taken for nominal (no --reference)"
-    print(f"experiment {args.experiment}, method {model.name}, unit {unit}")
-    for path, note in zip(paths, found.notes):
-        if note:
-            print(f"{shown(path)}: {note}", file=sys.stderr)
-    if args.json is not None:
-        write_text(args.json, json.dumps(result, indent=1) + "\n")
+    given, reference = (
+        Recordings(what, {str(path): read_recording(path) for path in files})
+        for what, files in (("files", paths), ("--reference", healthy))
+    )
+    found = identify(given, reference, args.experiment, args.method, args.level, args.results, args.actuator)
+    _tell(found, args)
 
 
 def _of_diagnosis(args: argparse.Namespace, paths: list[Path]) -> None:
@@ -78,34 +73,22 @@ def _of_diagnosis(args: argparse.Namespace, paths: list[Path]) -> None:
     ------
     InputError : options that a diagnosis does not take, or a verdict that is not of these recordings
     """
-    import json
-
+    from ..api.identification import of_diagnosis
     from ..errors import InputError
-    from ..identification.diagnosed import of_verdict
-    from ..io.atomic import write_text
 
     for option in ("reference", "method", "actuator"):
         if getattr(args, option):
             raise InputError(f"--{option}: is that of the diagnosis where --diagnosis is given")
-    found = of_verdict(args.diagnosis, paths, args.level)
-    result = {str(path): estimate for path, estimate in zip(paths, found.estimates)}
-    print(table(result, args.level))
-    taken_out = ", ".join(found.taken_out) or "nothing"
-    print(f"diagnosis {args.diagnosis}, taken out: {taken_out}, the unit's tolerances fitted")
+    _tell(of_diagnosis(args.diagnosis, paths, args.level), args)
+
+
+def _tell(found: "Identification", args: argparse.Namespace) -> None:
+    import json
+
+    from ..io.atomic import write_text
+
+    print(found)
+    for name, note in found.notes.items():
+        print(f"{shown(name)}: {note}", file=sys.stderr)
     if args.json is not None:
-        write_text(args.json, json.dumps(result, indent=1) + "\n")
-
-
-def table(result: dict, level: float) -> str:
-    """Estimates and intervals as aligned text."""
-    from ..faults import FAULT_NAMES
-
-    width = max(len("file"), *(len(shown(name)) for name in result))
-    lines = [f"{'file':{width}} " + " ".join(f"{name:>28}" for name in FAULT_NAMES)]
-    for name, estimate in result.items():
-        cells = []
-        for component in FAULT_NAMES:
-            e, digits = estimate[component], 2 if component == "dT" else 4
-            cells.append(f"{e['value']:9.{digits}f} [{e['low']:7.{digits}f}, {e['high']:7.{digits}f}]")
-        lines.append(f"{shown(name):{width}} " + " ".join(f"{cell:>28}" for cell in cells))
-    return "\n".join([*lines, f"in brackets {100 * level:.0f} % intervals; N and xi in 1, dT in K above 20 degC"])
+        write_text(args.json, json.dumps(found.estimates, indent=1) + "\n")

@@ -145,7 +145,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
         "Probabilities are exclusive and sum to one. The gain is that of all recordings fitted together: what the "
         "confirming recordings, or another size in each recording, speak against has lost its probability all the same."
     )
-    page.figure("which", figures.draw_ranking(_ranked(verdict)), about)
+    page.figure("which", figures.draw_ranking(ranked(verdict)), about)
     rows = [
         [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
         for m, e in enumerate(verdict["which"][:MOST])
@@ -177,7 +177,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
         page.heading("Fault vector before and after")
         page.figure(
             "faults",
-            figures.draw_faults(_faults(verdict, truths)),
+            figures.draw_faults(fault_vectors(verdict, truths)),
             "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
         )
     page.parts.append(f"{MARKS[0]}{retrained}{MARKS[1]}")
@@ -209,7 +209,7 @@ def separated(sets: Sequence[str]) -> str:
     return f"{words['one']} from {words['two'] if rival != ['no_gap'] else 'no gap'}"
 
 
-def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
+def ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Entries of the picture of probabilities."""
     named = verdict["verdict"] in ("explained", "group", "partly")
     out = []
@@ -270,7 +270,7 @@ def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
     return out or ["No listed effect is left between named and ruled out."]
 
 
-def _faults(verdict: Mapping[str, Any], truths: Mapping[str, Any]) -> list[dict[str, Any]]:
+def fault_vectors(verdict: Mapping[str, Any], truths: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Rows of the picture of the fault vector, recordings of one fault together."""
     groups: dict[tuple, dict[str, Any]] = {}
     for name, entry in verdict["fault_vector"].items():

@@ -1,6 +1,6 @@
 """What to record next on a bench, with the commanded motions as files."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,22 +39,39 @@ def plan(path: str | Path, spec: Mapping[str, Any], out: str | Path | None = Non
     ------
     InputError : recordings or a verdict that cannot be used, or a folder that cannot be written
     """
-    read = _read(Path(path)) if str(path).endswith(".json") else None
+    read = read_verdict(path) if str(path).endswith(".json") else None
     name = read["bench"] if read else bench_name(path)
     folder = Path(out) if out is not None else results_folder() / "plans" / file_name(name)
     _refuse_foreign(folder, force)  # before the work, not after it
-    verdict = read or _diagnosed(path, spec)
+    entries = (read or _diagnosed(path, spec))["next_experiment"]
+    written = write_motions(entries, folder)
+    for n, line in enumerate(sentences(entries)):
+        print(f"{line} ({written[n]})" if written else line)
+    return written
+
+
+def sentences(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What to record next, a line each, numbered; one line that says so where there is nothing."""
+    return [
+        f"{n}. {entry['command']}, soaked at {entry['ambient_temperature']:g} degC: tells "
+        f"{separated(entry['separates'])}, with odds of {entry['expected_odds']:.3g}"
+        for n, entry in enumerate(entries, start=1)
+    ] or ["Nothing to record: no other reading of these recordings is left."]
+
+
+def write_motions(entries: Sequence[Mapping[str, Any]], folder: str | Path, force: bool = True) -> list[Path]:
+    """Write the motion of every entry as a table of time (s) and position (rad).
+
+    Raises
+    ------
+    InputError : a folder that cannot be written, or, without ``force``, that holds something else
+    """
+    _refuse_foreign(Path(folder), force)
     written = []
-    for n, entry in enumerate(verdict["next_experiment"], start=1):
-        target = folder / f"{n}_{entry['motion']['name']}.csv"
-        write_text(target, _motion(entry["motion"]))
+    for n, entry in enumerate(entries, start=1):
+        target = Path(folder) / f"{n}_{entry['motion']['name']}.csv"
+        write_text(target, _as_text(motion_of(entry)))
         written.append(target)
-        print(
-            f"{n}. {entry['command']}, soaked at {entry['ambient_temperature']:g} degC: tells "
-            f"{separated(entry['separates'])}, with odds of {entry['expected_odds']:.3g} ({target})"
-        )
-    if not written:
-        print("Nothing to record: no other reading of these recordings is left.")
     return written
 
 
@@ -63,7 +80,13 @@ def _diagnosed(path: str | Path, spec: Mapping[str, Any]) -> dict[str, Any]:
     return found.verdict | {"next_experiment": found.next_experiments()}
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_verdict(path: str | Path) -> dict[str, Any]:
+    """The ``diagnosis.json`` of a bench of the actuator, with what to record next checked.
+
+    Raises
+    ------
+    InputError : another file, or entries that are not as a diagnosis writes them
+    """
     verdict = read_json(path)
     if not isinstance(verdict, dict) or verdict.get("twin") != "actuator":
         raise InputError(f"{shown(path)}: accepted is the diagnosis.json of a bench of the actuator")
@@ -104,8 +127,14 @@ def _refuse_foreign(folder: Path, force: bool) -> None:
                 raise InputError(f"--out: {shown(path)}: is no motion, --force replaces it")
 
 
-def _motion(motion: Mapping[str, Any]) -> str:
+def motion_of(entry: Mapping[str, Any]) -> np.ndarray:
+    """(time, 2) time (s) and commanded position of the user shaft (rad) of what to record next."""
+    motion = entry["motion"]
     position = command_positions(motion["name"], motion["settings"], motion["duration"], PLAYED)
     time = PLAYED * np.arange(round(motion["duration"] / PLAYED) + 1)
-    lines = [f"{t:.6g},{x:.9g}" for t, x in zip(time, position, strict=False)]
-    return "\n".join([HEADER, *lines]) + "\n"
+    length = min(len(time), len(position))
+    return np.column_stack([time[:length], position[:length]])
+
+
+def _as_text(motion: np.ndarray) -> str:
+    return "\n".join([HEADER, *(f"{t:.6g},{x:.9g}" for t, x in motion)]) + "\n"

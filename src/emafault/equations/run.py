@@ -1,6 +1,7 @@
 """A bench of the reference actuator diagnosed by equation errors: read, diagnosed, written with a page."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -49,19 +50,19 @@ def diagnose_folder(
     InputError : recordings or effects that cannot be used, or results that cannot be written
     """
     name = bench_name(path)
-    folder = Path(out) if out is not None else results_folder() / "diagnoses" / file_name(name)
+    folder = Path(out) if out is not None else folder_of(name)
     refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
     if corrected is not None:
         new_folder(path, corrected, "--corrected")
     bench, found = diagnosed(path, spec, exclude)
     verdict = found.verdict
     with aside(track) as tracked:
-        _write(found, bench, folder, experiment, _differing(spec["actuator"]))
+        write(found, bench, folder, experiment)
         if corrected is not None:
             undone = write_corrected(found, bench.recordings, path, corrected)
             print(f"corrected recordings in {corrected}, undone: {'; '.join(undone) or 'nothing'}", flush=True)
         print(f"written to {folder}", flush=True)
-        tracked(spec["tracking"], folder, verdict)
+        tracked(spec["tracking"], folder, verdict, finding(verdict), path)
     return verdict
 
 
@@ -72,29 +73,48 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     ------
     InputError : recordings or effects that cannot be used
     """
-    actuator = ActuatorParameters(**spec["actuator"])
-    bench = read_bench(path, actuator)
-    split = split_bench(bench.recordings)
-    noise, tolerances = SensorNoise(**spec["sensors"]), spec["tolerances"]
-    found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, tolerances)
-    found.verdict["warnings"] = bench.warnings
+    bench = read_bench(path, ActuatorParameters(**spec["actuator"]))
+    found = diagnose_bench(bench, spec, exclude)
     print("\n".join(finding(found.verdict)), flush=True)
     return bench, found
 
 
-def _differing(actuator: Mapping[str, Any]) -> dict[str, Any]:
+def diagnose_bench(bench: Bench, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> Diagnosed:
+    """Diagnose recordings that have been read and checked.
+
+    Parameters
+    ----------
+    spec : ``actuator``, ``sensors`` and ``tolerances`` of a composed configuration
+    exclude : effects that the library is to lack
+
+    Raises
+    ------
+    InputError : an effect that does not exist
+    """
+    actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
+    split = split_bench(bench.recordings)
+    found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, spec["tolerances"])
+    found.verdict["warnings"] = bench.warnings
+    return found
+
+
+def folder_of(bench: str) -> Path:
+    """Folder that the diagnosis of a bench is written to unless another is named."""
+    return results_folder() / "diagnoses" / file_name(bench)
+
+
+def _differing(actuator: ActuatorParameters) -> dict[str, Any]:
     """Parameters that are not those of the reference actuator."""
     reference = read_yaml(CONF / "actuator" / "reference.yaml")
-    return {name: value for name, value in actuator.items() if value != reference[name]}
+    return {name: value for name, value in asdict(actuator).items() if value != reference[name]}
 
 
-def _write(
-    found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None, actuator: Mapping[str, Any]
-) -> None:
+def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None = None) -> None:
+    """Write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``, the last also to ``experiment``."""
     verdict = found.verdict
     verdict["next_experiment"] = found.next_experiments()
     name = f"diagnosed_{file_name(bench.name)}"
-    text = experiment_text(verdict, verdict["simulator"]["after"], name, actuator)
+    text = experiment_text(verdict, verdict["simulator"]["after"], name, _differing(found.bench.machine.actuator))
     last = checked(verdict)
     truths = {n: r.fault for n, r in bench.recordings.items()}
     draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)

@@ -38,7 +38,7 @@ LARGEST = {"s": 1e9, "V": 1e6, "A": 1e6, "rad/s": 1e6, "rad": 1e8, "degC": 1e6}
 LARGEST_FAULT = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1000.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """One recording; voltages (V), currents (A), speed (rad/s), angles (rad), ambient temperature (degC)."""
 
@@ -61,6 +61,10 @@ class Recording:
     def interval(self) -> float:
         """Recording interval (s)."""
         return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    def __repr__(self) -> str:
+        samples = f"{len(self.time)} samples of {self.interval:g} s"
+        return f"Recording {self.name}: {samples}, {self.health}, soaked at {self.ambient_temperature:.1f} degC"
 
     @property
     def health(self) -> str:

@@ -71,7 +71,7 @@ def diagnose_file(
         write_text(folder / VERDICT, to_json({"bench": name, "twin": machine.name, "cases": together}))
     print(f"written to {folder}", flush=True)
     for case, diagnosed in found.items() if track else ():
-        log_diagnosis(spec["tracking"], folders[case], diagnosed.verdict)
+        log_diagnosis(spec["tracking"], folders[case], diagnosed.verdict, finding(diagnosed.verdict), path)
     return {case: d.verdict for case, d in found.items()}
 
 

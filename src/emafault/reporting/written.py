@@ -3,10 +3,11 @@
 import json
 import math
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, shown
-from ..paths import results_folder
 from ..places import refuse_folder, refuse_irregular, refuse_output
 from ..plain import read_json
 from ..processes import end_with
@@ -114,7 +114,7 @@ def _is_experiment(path: Path) -> bool:
 def aside(track: bool) -> Iterator[Callable[..., None]]:
     """Gives ``log_diagnosis``, done in a process of its own, which loads what it needs meanwhile; nothing without
     ``track``."""
-    if not track:
+    if not track or find_spec("mlflow") is None:
         yield lambda *_: None
         return
     if "fork" not in get_all_start_methods():
@@ -137,39 +137,35 @@ def _say_if_not(failure: str) -> None:
         say(f"not tracked: {' '.join(failure.split())[:200]}")
 
 
-def log_diagnosis(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> None:
-    """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure."""
-    _say_if_not(_failure(tracking, folder, verdict))
+def log_diagnosis(
+    tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any], sentences: Sequence[str], source: str | Path
+) -> None:
+    """Log the diagnosis as an MLflow run; whatever goes wrong is one line and no failure.
+
+    Parameters
+    ----------
+    folder : where it was written
+    sentences : what was found
+    source : file or folder of the recordings
+    """
+    _say_if_not(_failure(tracking, folder, verdict, sentences, source))
 
 
-def _failure(tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any]) -> str:
-    """Log it; what went wrong, or nothing."""
-    from ..tracking import Entry, log_run
-
-    first = verdict["which"][0]
-    metrics = {"probability": first["probability"]}
-    for kind, rung in verdict["shrinks"].items():
-        metrics |= {f"{kind}.{k}": v for k, v in (rung or {}).items() if v is not None}
-    for name, p in first.get("parameters", {}).items():
-        metrics[f"parameter.{name}"] = p["value"]
-    entry = Entry(
-        verdict["bench"],
-        parameters={
-            "verdict": verdict["verdict"],
-            "effects": "+".join(first["effects"]) or "no_gap",
-            "twin": verdict["twin"],
-            "recordings": verdict["recordings"],
-            "digest": verdict["digest"],
-        },
-        metrics=metrics,
-        tags={"stage": "diagnosis", "bench": verdict["bench"]},
-        files={str(folder / name): "" for name in (VERDICT, REPORT)},
-    )
+def _failure(
+    tracking: Mapping[str, str], folder: Path, verdict: Mapping[str, Any], sentences: Sequence[str], source: str | Path
+) -> str:
+    """Log it, where MLflow is installed; what went wrong, or nothing."""
+    if find_spec("mlflow") is None:
+        return ""
     try:
-        uri = tracking["uri"]
-        if uri.startswith("sqlite:///results/"):
-            uri = f"sqlite:///{results_folder() / uri.removeprefix('sqlite:///results/')}"
-        log_run(uri, tracking["experiment"], entry)
+        from ..tracking import log_run
+        from ..tracking.diagnosis import entry_of
+        from ..tracking.experiments import DIAGNOSES
+        from ..tracking.store import address
+
+        files = {str(folder / name): "" for name in (VERDICT, REPORT)}
+        entry = entry_of(verdict, sentences, Path(source), files)
+        log_run(address(tracking["uri"]), tracking["experiment"], entry, DIAGNOSES)
     except Exception as error:
         return str(error) or type(error).__name__
     return ""

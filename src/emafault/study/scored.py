@@ -1,12 +1,22 @@
 """The scoreboard of a draw of blind cases, written and tracked."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from ..tracking import Entry, log_run
+from ..provenance import digest_of, file_digest
+from ..tracking import Data, Entry, log_run
+from ..tracking.experiments import BLIND_CASES
 from ..withheld.scoreboard import write_scoreboard
 from ..withheld.scoring import score
+
+#: metrics of a scoreboard that a run has; the others stand in its table
+COMPARED = (
+    "right_t1", "right_t4", "pairs_t2", "wrong_t0", "no_gap_t0", "wrong_t3", "equation_t3", "named_t7", "beside_t7",
+    "loss_t7", "same_t9", "wrong_t8", "closed_t8_inside", "false_share", "ece", "coverage", "closed_signal",
+    "closed_features", "closed_faults", "fault_ratio",
+)  # fmt: skip
 
 
 def score_draw(
@@ -31,13 +41,23 @@ def score_draw(
     if page != report:
         page.replace(report)
     place = json.loads(Path(where).read_text())
-    metrics = {m["id"]: float(m["value"]) for m in found["metrics"] if m["value"] is not None}
+    values = {m["id"]: float(m["value"]) for m in found["metrics"] if m["value"] is not None}
     draw = report.parent.name
-    files: dict[str, str | Path] = {str(report): "", str(scores): ""}
+    cases = len(found["rows"])
+    data = Data(f"blind cases {draw}", digest_of(*map(file_digest, sorted(batches))), str(folder), "evaluation", cases)
     entry = Entry(
         f"withheld {draw}",
-        {"draw": draw, "cases": len(found["rows"])},
-        metrics,
-        files=files,
+        {"draw": draw, "cases": cases},
+        {name: values[name] for name in COMPARED if name in values},
+        tables={"tables/metrics.json": _as_columns(found["metrics"])},
+        note=f"{cases} blind cases of the draw {draw}; the scoreboard is among the artifacts.",
+        data=[data],
+        files={str(report): "", str(scores): ""},
     )
-    log_run(place["uri"], place["experiment"], entry)
+    log_run(place["uri"], place["experiment"], entry, BLIND_CASES)
+
+
+def _as_columns(metrics: Sequence[Mapping[str, Any]]) -> dict[str, list]:
+    """Every metric with its interval and what is asked of it, as columns."""
+    columns = {c: [m[c] for m in metrics] for c in ("id", "title", "value", "low", "high", "cases")}
+    return columns | {c: ["" if m[c] is None else str(m[c]) for m in metrics] for c in ("good", "aim")}

@@ -1,43 +1,70 @@
 """MLflow: one database and experiment, created once, one writer at a time, everything logged in batches.
 
-The tracking server's address is a setting. A local SQLite file is locked while it is written, since MLflow breaks when
-several processes create or migrate one.
+What an experiment is for stands in ``experiments``, how the database is reached in ``store``.
 """
 
 import contextlib
 import json
-import logging
-import os
-import re
 import subprocess
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import __version__
-from .databases import SQLITE, locked, with_driver, without_password
-from .errors import InputError
-from .io.atomic import replace_atomically
-from .places import kind
-from .processes import still_there, this_process
+from .. import __version__
+from ..processes import still_there, this_process
+from .experiments import STUDIES, Experiment
+from .store import connected, ensured
 
 _OWNER = "emafault.owner"  # tag of the process that logs a run
 _LONGEST_VALUE = 6000
+MOST = 20  # metrics of a run
+
+
+@dataclass(frozen=True)
+class Data:
+    """A data set that a run has used."""
+
+    name: str
+    digest: str
+    source: str  # path or words: where it is had from
+    context: str  # what for: training, evaluation, diagnosis
+    rows: int
+
+
+@dataclass(frozen=True)
+class Network:
+    """A trained network, logged as a model with its own figures."""
+
+    path: str | Path  # ONNX file
+    parameters: Mapping[str, str]
+    metrics: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What one MLflow run holds; ``children`` become nested runs."""
+    """What one MLflow run holds; ``children`` become nested runs.
+
+    Metrics are the figures that one compares, up to ``MOST`` with the curves; the others stand in ``tables``.
+    """
 
     name: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     metrics: Mapping[str, float] = field(default_factory=dict)
     curves: Mapping[str, list[float]] = field(default_factory=dict)  # metric over steps
+    tables: Mapping[str, Mapping[str, list]] = field(default_factory=dict)  # file among the artifacts -> columns
     tags: Mapping[str, str] = field(default_factory=dict)
+    note: str = ""  # description in Markdown
+    data: Sequence[Data] = ()
+    network: Network | None = None
     files: Mapping[str, str | Path] = field(default_factory=dict)  # file or folder -> folder among the artifacts
     children: tuple["Entry", ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.metrics) + len(self.curves) + (len(self.network.metrics) if self.network else 0)
+        if count > MOST:
+            raise ValueError(f"{self.name}: {count} metrics, up to {MOST} can be compared; tables take more")
 
 
 def code_version() -> str:
@@ -60,26 +87,30 @@ def flatten(value: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def ensure_experiment(uri: str, experiment: str) -> str:
+def ensure_experiment(uri: str, name: str, experiment: Experiment = STUDIES) -> str:
     """Identifier of the experiment; database and experiment are created where they do not exist.
+
+    Parameters
+    ----------
+    name : that the configuration gives; of anything but studies the experiment has an ending more
 
     Raises
     ------
     InputError : a server or file that cannot be used
     """
-    with _client(uri) as client:
-        return _experiment_id(client, uri, experiment)
+    with connected(uri) as client:
+        return ensured(client, uri, name, experiment)
 
 
-def log_run(uri: str, experiment: str, entry: Entry) -> str:
+def log_run(uri: str, name: str, entry: Entry, experiment: Experiment = STUDIES) -> str:
     """Log one run with its children and return its identifier.
 
     Raises
     ------
     InputError : a server or file that cannot be used
     """
-    with _client(uri) as client:
-        experiment_id = _experiment_id(client, uri, experiment)
+    with connected(uri) as client:
+        experiment_id = ensured(client, uri, name, experiment)
         _end_abandoned(client, experiment_id)
         return _log(client, experiment_id, entry, {})
 
@@ -96,6 +127,7 @@ def _log(client, experiment_id: str, entry: Entry, tags: Mapping[str, str]) -> s
     now = int(1000 * time.time())
     every = {"mlflow.source.name": "emafault", "code_version": code_version(), **entry.tags, **tags}
     every[_OWNER] = json.dumps(this_process())
+    every |= {"mlflow.note.content": entry.note} if entry.note else {}
     run = client.create_run(experiment_id, start_time=now, run_name=entry.name, tags=every).info.run_id
     try:
         _fill(client, experiment_id, run, entry, now)
@@ -111,19 +143,56 @@ def _fill(client, experiment_id: str, run: str, entry: Entry, now: int) -> None:
     """Log what an entry holds, then its children."""
     from mlflow.entities import Metric, Param
 
+    _log_data(client, run, entry.data)
     parameters = [Param(key, str(value)[:_LONGEST_VALUE]) for key, value in flatten(entry.parameters).items()]
     metrics = [Metric(_name(key), float(value), now, 0) for key, value in entry.metrics.items() if value == value]
+    if entry.network is not None:
+        model = _log_network(client, experiment_id, run, entry.network)
+        metrics += [Metric(key, float(value), now, 0, model_id=model) for key, value in entry.network.metrics.items()]
     for key, values in entry.curves.items():
         metrics += [Metric(_name(key), float(value), now, step) for step, value in enumerate(values)]
     for part in _pieces(parameters, 100):
         client.log_batch(run, params=part)
     for part in _pieces(metrics, 1000):
         client.log_batch(run, metrics=part)
+    for file, columns in entry.tables.items():
+        client.log_table(run, {column: list(values) for column, values in columns.items()}, file)
     for path, folder in entry.files.items():
         log = client.log_artifacts if Path(path).is_dir() else client.log_artifact
         log(run, str(path), folder or None)
     for child in entry.children:
         _log(client, experiment_id, child, {"mlflow.parentRunId": run})
+
+
+def _log_data(client, run: str, data: Sequence[Data]) -> None:
+    from mlflow.entities import Dataset, DatasetInput, InputTag
+
+    inputs = [
+        DatasetInput(
+            Dataset(d.name, d.digest, "local", json.dumps({"uri": d.source}), profile=json.dumps({"num_rows": d.rows})),
+            [InputTag("mlflow.data.context", d.context)],
+        )
+        for d in data
+    ]
+    if inputs:
+        client.log_inputs(run, inputs)
+
+
+def _log_network(client, experiment_id: str, run: str, network: Network) -> str:
+    """Log the network with its signature as a model of the run; its identifier."""
+    from mlflow.entities import LoggedModelOutput
+
+    from .network import saved
+
+    made = client.create_logged_model(
+        experiment_id, name="network", source_run_id=run, params=dict(network.parameters), model_type="onnx"
+    )
+    model = made.model_id
+    with saved(str(network.path), model, run) as folder:
+        client.log_model_artifacts(model, folder)
+    client.finalize_logged_model(model, "READY")
+    client.log_outputs(run, [LoggedModelOutput(model, 0)])
+    return model
 
 
 def _name(key: str) -> str:
@@ -133,56 +202,3 @@ def _name(key: str) -> str:
 
 def _pieces(items: list, size: int) -> Iterable[list]:
     return [items[start : start + size] for start in range(0, len(items), size)]
-
-
-def _experiment_id(client, uri: str, name: str) -> str:
-    found = client.get_experiment_by_name(name)
-    if found:
-        return found.experiment_id
-    location = None
-    if uri.startswith(SQLITE):
-        location = (Path(uri.removeprefix(SQLITE)).resolve().parent / "mlflow_artifacts").as_uri()
-    try:
-        return client.create_experiment(name, artifact_location=location)
-    except Exception:
-        found = client.get_experiment_by_name(name)  # another process was first
-        if found is None:
-            raise
-        return found.experiment_id
-
-
-def _create(path: Path) -> None:
-    """Create a database of runs, whole or not at all: MLflow cannot go on with one whose tables are half made."""
-    from mlflow import MlflowClient
-
-    if path.exists():
-        return
-    for journal in path.parent.glob(f".{path.name}.*.part-journal"):  # of one that was killed; the lock is ours
-        journal.unlink()
-    replace_atomically(path, lambda temporary: MlflowClient(f"{SQLITE}{temporary}").search_experiments())
-
-
-@contextlib.contextmanager
-def _client(uri: str) -> Iterator[Any]:
-    """A client, with the local database locked while it is open."""
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    from mlflow import MlflowClient
-    from mlflow.exceptions import MlflowException
-    from sqlalchemy.exc import SQLAlchemyError
-
-    for name in ("mlflow", "alembic"):  # what goes wrong is raised too; the import sets levels of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL)
-
-    with contextlib.ExitStack() as stack:
-        try:
-            if uri.startswith(SQLITE):
-                path = Path(uri.removeprefix(SQLITE))
-                if kind(path, "tracking.uri") not in ("", "file"):  # MLflow tries for minutes to open it
-                    raise InputError(f"tracking.uri: {uri} cannot be used (not a file)")
-            stack.enter_context(locked(uri))
-            if uri.startswith(SQLITE):
-                _create(Path(uri.removeprefix(SQLITE)))
-            yield MlflowClient(tracking_uri=with_driver(uri))
-        except (MlflowException, SQLAlchemyError, ImportError, OSError) as error:
-            reason = " ".join(re.split(r"\[SQL:|\(Background on", str(error))[0].split())
-            raise InputError(f"tracking.uri: {without_password(uri)} cannot be used ({reason[:300]})") from error

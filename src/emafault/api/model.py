@@ -8,6 +8,7 @@ from typing import Any
 from .. import checks, schema
 from .. import config as configuration
 from ..actuator.parameters import ActuatorParameters
+from ..datasheet.override import override_of
 from ..errors import InputError, shown
 from ..identification.identifier import Identifier
 from ..identification.intervals import ConformalIntervals
@@ -16,7 +17,6 @@ from ..identification.recordings import Model
 from ..paths import results_folder
 from ..places import kind
 from ..plain import read_json, read_yaml
-from .machine import of_file
 
 
 def load_model(
@@ -75,7 +75,7 @@ def _composed(experiment: str, actuator: str | None) -> dict[str, Any]:
     """An experiment's configuration, of one's own actuator with its tolerance as what is known of R0, k0 and L0."""
     if actuator is None:
         return configuration.compose(experiment)
-    config = configuration.compose(experiment, [of_file(actuator)])
+    config = configuration.compose(experiment, [override_of(actuator)])
     own = config["tolerances"]
     known = {**own["unit_calibration"], **own["inductance_tolerance"]}
     unit = config["unit"] | {"known": {q: known[f"{q}_scale"] for q in "RkL"}}

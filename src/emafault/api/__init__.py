@@ -1,0 +1,1 @@
+"""What ``emafault`` offers Python: functions that the command line calls too, and their results as objects."""
