@@ -48,6 +48,7 @@ class Diagnosed:
     fit: Fit
     reading: Reading
     leading: Model
+    before: Mapping[str, float]  # all parameters of the recalibrated nominal model
     values: Mapping[str, float]  # of all parameters at the leading set's fit
     noise: SensorNoise
 
@@ -182,7 +183,7 @@ def _diagnosed(
     verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
-    posterior = _covariance(bench, fit, best)
+    posterior = covariance_of(bench, fit, best)
     after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
@@ -200,7 +201,7 @@ def _diagnosed(
         verdict["held_out"] = {e: round(r, 3) for e, r in held_out.ratios.items()}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
-    return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)
+    return Diagnosed(verdict, bench, fit, reading, best, before_point, after_values, noise)
 
 
 def _from_off(bench: Bench, model: Model) -> dict[str, float]:
@@ -384,7 +385,7 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
     return out
 
 
-def _covariance(bench: Bench, fit: Fit, model: Model) -> tuple[dict[str, int], np.ndarray]:
+def covariance_of(bench: Bench, fit: Fit, model: Model) -> tuple[dict[str, int], np.ndarray]:
     """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
     k = np.array([fit.normal.index[n] for n in names])

@@ -14,9 +14,11 @@ from ..places import file_name
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
+from .curves import panels
 from .diagnose import Diagnosed, diagnose
+from .fitted import numbers
 from .handover import experiment_text
-from .page import draw, finding
+from .page import Detail, draw, finding
 
 PROCESSES = 2
 
@@ -89,4 +91,5 @@ def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path 
     if experiment is not None:
         write_text(experiment, text)
     truths = {n: r.fault for n, r in bench.recordings.items()}
-    draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
+    detail = Detail(panels(found, verdict["recordings"]["confirm"]), numbers(found))
+    draw(verdict, truths, section(folder, verdict), detail).write(folder / REPORT)

@@ -104,6 +104,16 @@ def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.F
     return fig
 
 
+def ladder_in_words(rungs: Mapping[str, Mapping[str, float | None] | None]) -> str:
+    """What the ladder shows, for who cannot see it."""
+    said = [
+        f"{kind.replace('_', ' ')}: {', '.join(f'{name} {v:.3g}' for name, v in rung.items() if v is not None)}"
+        for kind, rung in rungs.items()
+        if rung
+    ]
+    return f"Misfit over the noise. {'; '.join(said)}."
+
+
 def draw_faults(groups: Sequence[Mapping[str, Any]]) -> plt.Figure:
     """Fault vector before and after with 90 % intervals, one row of panels per different fault; a tick marks the truth.
 
