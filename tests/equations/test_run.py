@@ -73,8 +73,8 @@ def test_the_page_has_a_chart_of_every_equation_and_every_fitted_number(written,
     for equation in ("electrical_a", "electrical_b", "electrical_c", "torque", "sensor_speed", "position", "control"):
         assert f'id="panel_{equation}"' in page
     for number in (
-        "magnet temperature: alpha m",
-        "unit calibration: R scale",
+        "magnet temperature: alpha_m",
+        "unit calibration: R_scale",
         "inertia: scale",
         "controller: speed gain",
     ):

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from emafault.reporting.numbers import Number, Numbers, add_numbers, trading
+from emafault.reporting.numbers import Number, Numbers, add_numbers, as_told, trading
 from emafault.reporting.page import Page
 from emafault.reporting.panels import MOST, Curves, Panel, said
 
@@ -110,8 +110,18 @@ def test_what_trades_off_is_told_with_its_sign_and_never_of_one_recording():
     page = Page("x")
     add_numbers(page, fitted(-0.8, 0.99, 0.0))
     text = "".join(page.parts)
-    assert "a larger mass goes with a smaller gain; were one known, the other would be 60% as uncertain" in text
+    assert "a larger mass goes with a smaller gain; were one known, the other would be 60 % as uncertain" in text
     assert text.index("mass") < text.index("<details>") < text.index("zero, a") < text.index("</details>")
+
+
+def test_a_number_has_one_interval_on_a_page():
+    a = {"value": 2.0, "low": 1.0, "high": 3.0, "effect": "x_y"}
+    told = {"which": [{"effects": []}, {"effects": ["x_y"], "parameters": {"a": a}}],
+            "controller": {"gain": {"value": 5.0, "low": 4.0, "high": 6.0}}}  # fmt: skip
+    names = ("x y: a", "controller: gain", "mass")
+    found = as_told(Numbers([Number(n, "unit", 0.0, 1.0, 0.1, 1.0, "1") for n in names], np.eye(3)), told, ["x_y"])
+    assert [n.value for n in found.numbers] == [2.0, 5.0, 1.0]
+    assert [n.sd for n in found.numbers] == pytest.approx([1 / 1.645, 1 / 1.645, 0.1])
 
 
 def test_no_number_is_minus_zero():

@@ -1,6 +1,7 @@
 """What the equations of the reference actuator leave, before and after, for the charts of a page."""
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..diagnosis.model import Block
 from ..diagnosis.whitening import whiten
@@ -9,7 +10,7 @@ from .diagnose import Diagnosed
 from .electrical import NAMES
 from .machine import ReferenceActuator, rows_of
 from .point import Point, State
-from .signals import Signals
+from .signals import Signals, odd
 
 #: coordinates that a reader may choose, in words
 ALONG = {
@@ -19,13 +20,21 @@ ALONG = {
 #: measured side of each equation, in words
 QUANTITY = {
     **{name: f"voltage of phase {name[-1]} (V)" for name in NAMES},
-    "torque": "inertia times acceleration (N m)", "sensor_speed": "recorded speed (rad/s)",
+    "torque": "J times acceleration, 10 ms (N m)", "sensor_speed": "recorded speed (rad/s)",
     "sensor_current": "sum of the currents (A)", "position": "output position (rad)", "bus": "bus voltage (V)",
 }  # fmt: skip
 
 
-def panels(found: Diagnosed, confirm: list[str]) -> list[Panel]:
-    """One panel an equation: the recalibrated nominal model before, the leading set after."""
+SMOOTHED = 1e-2  # s, that a second difference of the angle, which is mostly noise, is averaged over for the eye
+
+
+def panels(found: Diagnosed) -> list[Panel]:
+    """One panel an equation: the recalibrated nominal model before, the leading set after.
+
+    An equation that leaves something is shown along the coordinate that most of it lies along.
+    """
+    confirm = found.verdict["recordings"]["confirm"]
+    where = {w["equation"]: ALONG.get(w["along"], "") for w in reversed(found.verdict["where"])}
     machine = found.bench.machine
     curves: dict[str, list[Curves]] = {}
     for name in found.bench.recordings:
@@ -33,20 +42,30 @@ def panels(found: Diagnosed, confirm: list[str]) -> list[Panel]:
         after = machine.blocks(found.values, name, wanted=())
         for old, new in zip(before, after, strict=True):
             measured = _measured(machine, found, name, old.equation)
-            curves.setdefault(old.equation, []).append(_curves(old, new, measured, name in confirm))
-    return [Panel(e, QUANTITY.get(e, ""), c) for e, c in curves.items()]
+            curves.setdefault(old.equation, []).append(
+                _curves(old, new, measured, name in confirm, machine.recordings[name].interval)
+            )
+    return [
+        Panel(e, QUANTITY.get(e, ""), c, where.get(e, where.get(e.removesuffix(f"_{e[-1]}"), "")))
+        for e, c in curves.items()
+    ]
 
 
-def _curves(before: Block, after: Block, measured: np.ndarray | None, aside: bool) -> Curves:
+def _curves(before: Block, after: Block, measured: np.ndarray | None, aside: bool, interval: float) -> Curves:
     keep = np.flatnonzero(before.usable)
     size = len(before.residual)
+    time = np.broadcast_to(before.coordinates["time"], size)[keep]
+    keep = keep[np.argsort(time, kind="stable")]  # commutations come by phase
     deviation = np.sqrt(np.broadcast_to(before.bands[0], size))[keep]
     along = {words: np.broadcast_to(before.coordinates[n], size)[keep] for n, words in ALONG.items()}
-    order = np.argsort(along[ALONG["time"]], kind="stable")  # commutations come by phase
+    predicted = None
+    if measured is not None and before.equation == "torque":
+        width = odd(SMOOTHED / interval)
+        old, new = (uniform_filter1d(measured - b.residual, width)[keep] for b in (before, after))
+        measured, predicted = uniform_filter1d(measured, width), (old, new)
     return Curves(
-        before.recording, {n: x[order] for n, x in along.items()}, before.residual[keep][order] / deviation[order],
-        after.residual[keep][order] / deviation[order], deviation[order],
-        None if measured is None else measured[keep][order], (_square(before), _square(after)), aside,
+        before.recording, along, before.residual[keep] / deviation, after.residual[keep] / deviation, deviation,
+        None if measured is None else measured[keep], (_square(before), _square(after)), aside, predicted,
     )  # fmt: skip
 
 

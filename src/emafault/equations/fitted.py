@@ -1,9 +1,12 @@
 """The fitted numbers of a diagnosis of the reference actuator, with their posterior correlation."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..diagnosis.point import is_parameter
-from ..reporting.numbers import Number, Numbers
+from ..effects import EFFECTS
+from ..reporting.numbers import Number, Numbers, as_told
 from .diagnose import CONTROLLER, Diagnosed, covariance_of
 
 
@@ -24,11 +27,28 @@ def numbers(found: Diagnosed) -> Numbers:
         mix[row, [index[k] for k in (n, *beyond.get(n, ())) if k in index]] = 1.0
         sd = float(np.sqrt(mix[row] @ covariance @ mix[row]))
         kind = "effect" if n in own or n in beyond else _kind(n)
-        units = CONTROLLER.get(n.removeprefix("controller."), p.units)
-        out.append(Number(_words(n), kind, p.off, found.values[n], sd, bench.prior(n)[1], units))
+        one = Number(_words(n), kind, p.off, found.values[n], sd, bench.prior(n)[1], _units(n, p.units))
+        out.append(_of_logarithm(one) if ": log_" in one.name else one)
     whole = mix @ covariance @ mix.T
     width = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    return Numbers(out, whole / np.outer(width, width))
+    listed = [u for u in model.units if u in EFFECTS]
+    return as_told(Numbers(out, whole / np.outer(width, width)), found.verdict, listed)
+
+
+def _units(name: str, units: str) -> str:
+    group, _, short = name.partition(".")
+    listed = EFFECTS[group].parameters if group in EFFECTS else {}
+    known = listed.get(short.removeprefix("log_").partition("@")[0])
+    return known.units if known else CONTROLLER.get(short, units)
+
+
+def _of_logarithm(n: Number) -> Number:
+    """The number itself, where its logarithm was fitted."""
+    value = float(np.exp(n.value))
+    return replace(
+        n, name=n.name.replace("log_", ""), start=float(np.exp(n.start)), value=value, sd=value * n.sd,
+        prior=value * n.prior,
+    )  # fmt: skip
 
 
 def _kind(name: str) -> str:
@@ -38,5 +58,5 @@ def _kind(name: str) -> str:
 def _words(name: str) -> str:
     name, _, recording = name.partition("@")
     group, _, short = name.rpartition(".")
-    words = f"{group.replace('_', ' ')}: {short.replace('_', ' ')}" if group else short
+    words = f"{group.replace('_', ' ')}: {short}" if group else short
     return f"{words}, {recording.removesuffix('.nc')}" if recording else words

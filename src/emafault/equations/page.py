@@ -221,17 +221,15 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
 
 
 def separated(sets: Sequence[str]) -> str:
-    """What a recording would tell: the leading set from a rival, each as the verdict file joins its effects."""
+    """What a recording distinguishes: the leading set from a rival, each as the verdict file joins its effects."""
     first, rival = (s.split("+") for s in sets)
+    leading = _joined(first)
     more = [e for e in rival if e not in first]
-    words = {
-        k: " and ".join(e.replace("_", " ") for e in v) for k, v in (("one", first), ("two", rival), ("more", more))
-    }
-    if set(first) < set(rival) or first == ["no_gap"]:
-        return f"whether {words['more']} act{'s' if len(more) == 1 else ''}" + (
-            " as well" if set(first) < set(rival) else ""
-        )
-    return f"{words['one']} from {words['two'] if rival != ['no_gap'] else 'no gap'}"
+    return f"{leading} from {f'{leading} with {_joined(more)}' if set(first) < set(rival) else _joined(rival)}"
+
+
+def _joined(effects: Sequence[str]) -> str:
+    return " and ".join(e.replace("_", " ") for e in effects)
 
 
 def _ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -50,8 +50,8 @@ def plan(path: str | Path, spec: Mapping[str, Any], out: str | Path | None = Non
         write_text(target, _motion(entry["motion"]))
         written.append(target)
         print(
-            f"{n}. {entry['command']}, soaked at {entry['ambient_temperature']:g} degC: tells "
-            f"{separated(entry['separates'])}, with odds of {entry['expected_odds']:.3g} ({target})"
+            f"{n}. {entry['command']}, ambient temperature {entry['ambient_temperature']:g} degC: distinguishes "
+            f"{separated(entry['separates'])}, expected Bayes factor {entry['expected_odds']:.3g} ({target})"
         )
     if not written:
         print("Nothing to record: no other reading of these recordings is left.")

@@ -91,5 +91,5 @@ def _write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path 
     if experiment is not None:
         write_text(experiment, text)
     truths = {n: r.fault for n, r in bench.recordings.items()}
-    detail = Detail(panels(found, verdict["recordings"]["confirm"]), numbers(found))
+    detail = Detail(panels(found), numbers(found))
     draw(verdict, truths, section(folder, verdict), detail).write(folder / REPORT)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..reporting.numbers import Number, Numbers
+from ..reporting.numbers import Number, Numbers, as_told
 from ..reporting.panels import Curves, Panel
 from .diagnose import Diagnosed
 from .statement import Rows
@@ -49,7 +49,9 @@ def numbers(found: Diagnosed) -> Numbers:
         kind = "recording" if "@" in n else "effect" if n in own else "unit"
         out.append(Number(_words(n), kind, p.off, after[n], sd, bench.prior(n)[1], p.units))
     width = np.sqrt(np.diag(covariance))[kept]
-    return Numbers(out, covariance[np.ix_(kept, kept)] / np.outer(width, width))
+    listed = {e.id for e in found.machine.effects} & set(fitted.leading.units)
+    found_numbers = Numbers(out, covariance[np.ix_(kept, kept)] / np.outer(width, width))
+    return as_told(found_numbers, found.verdict, listed)
 
 
 def _words(name: str) -> str:

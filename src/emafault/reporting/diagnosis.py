@@ -80,7 +80,7 @@ def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.F
     units = {
         "signal": "misfit over noise (rms)",
         "features": "R, k error over noise (rms)",
-        "fault_vector": "fault error over its standard error (rms)",
+        "fault_vector": "error / standard error (rms)",
     }
     for ax, (kind, rung) in zip(axes[0], shown.items()):
         present = [n for n in names if rung.get(n) is not None]

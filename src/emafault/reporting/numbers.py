@@ -1,7 +1,8 @@
 """Every fitted number of a diagnosis, and which of them trade off, as a page shows them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,15 +46,34 @@ KINDS = {
 }
 
 
+def as_told(found: Numbers, verdict: Mapping[str, Any], effects: Collection[str]) -> Numbers:
+    """The same numbers, with values and intervals of the verdict for those that it tells.
+
+    ``effects``: those of the set that the numbers are of.
+    """
+    of_set = next((e for e in verdict["which"] if set(e["effects"]) == set(effects)), {})
+    told = {
+        f"{p['effect'].replace('_', ' ')}: {n.rpartition('.')[2]}": p for n, p in of_set.get("parameters", {}).items()
+    }
+    told |= {f"controller: {n}": p for n, p in verdict["controller"].items()}
+    numbers = [
+        replace(n, value=told[n.name]["value"], sd=(told[n.name]["high"] - told[n.name]["low"]) / (2.0 * Z))
+        if n.name in told
+        else n
+        for n in found.numbers
+    ]
+    return replace(found, numbers=numbers)
+
+
 def add_numbers(page: Page, found: Numbers, level: int = 2) -> None:
     """The table of every fitted number, those of single recordings folded, and what trades off."""
     page.heading("Every fitted number", level)
     page.paragraph(
         "Start is where the fit began: the nominal value, or the datasheet's. An interval holds the true value with a "
-        f"probability of 90 %, within the model. Where it is wider than {TOLD:.0%} of the interval known beforehand, "
-        "these recordings tell little of the number, and it stands near its start."
+        "probability of 90 %, within the model. Where these recordings determine a number little, its interval is "
+        f"wider than {100 * TOLD:.0f} % of what was known before, and it stays near its start."
     )
-    header = ["number", "what of", "start", "fitted", "90 % interval", "unit", "told by these recordings"]
+    header = ["number", "what of", "start", "fitted", "90 % interval", "unit", "determined by these recordings"]
     own = [n for n in found.numbers if n.kind == "recording"]
     page.table(header, [_row(n) for n in found.numbers if n.kind != "recording"])
     if own:
@@ -72,9 +92,14 @@ def add_numbers(page: Page, found: Numbers, level: int = 2) -> None:
 
 
 def trading(found: Numbers) -> list[tuple[Number, Number, float]]:
-    """Pairs of numbers that are not of single recordings, by the size of their correlation."""
+    """Pairs of effects' and the unit's numbers, or of one with the controller's, by the size of their correlation."""
     shown = [k for k, n in enumerate(found.numbers) if n.kind != "recording"]
-    pairs = [(i, k, float(found.correlation[i, k])) for a, i in enumerate(shown) for k in shown[a + 1 :]]
+    pairs = [
+        (i, k, float(found.correlation[i, k]))
+        for a, i in enumerate(shown)
+        for k in shown[a + 1 :]
+        if {found.numbers[i].kind, found.numbers[k].kind} != {"controller"}
+    ]
     large = sorted((p for p in pairs if abs(p[2]) >= TRADES), key=lambda p: -abs(p[2]))
     return [(found.numbers[i], found.numbers[k], r) for i, k, r in large[:MOST]]
 
@@ -89,5 +114,5 @@ def _row(n: Number) -> list[str]:
 def _pair(a: Number, b: Number, r: float) -> list[str]:
     way = "larger" if r > 0.0 else "smaller"
     left = float(np.sqrt(max(1.0 - r * r, 0.0)))
-    means = f"a larger {a.name} goes with a {way} {b.name}; were one known, the other would be {left:.0%} as uncertain"
-    return [f"{a.name} and {b.name}", f"{r:z.3f}", means]
+    known = f"were one known, the other would be {100 * left:.0f} % as uncertain"
+    return [f"{a.name} and {b.name}", f"{r:z.3f}", f"a larger {a.name} goes with a {way} {b.name}; {known}"]

@@ -18,11 +18,11 @@
   const read = (element) => {
     const panel = JSON.parse(element.querySelector("script").textContent);
     for (const r of panel.recordings) {
-      for (const name of ["measured", "before", "after", "deviation"]) r[name] = decoded(r[name]);
+      for (const name of ["measured", "before", "after", "deviation", "smooth_before", "smooth_after"]) r[name] = decoded(r[name]);
       r.along = r.along.map(decoded);
       const sd = (k) => (typeof r.deviation === "number" ? r.deviation : r.deviation[k]);
       const less = (residual) => r.measured && r.measured.map((v, k) => (residual[k] === null ? null : v - residual[k] * sd(k)));
-      r.predicted = [less(r.before), less(r.after)];
+      r.predicted = r.smooth_before ? [r.smooth_before, r.smooth_after] : [less(r.before), less(r.after)];
     }
     panel.means = panel.means.map((m) => [decoded(m.x), decoded(m.before), decoded(m.after)]);
     return panel;
@@ -73,7 +73,7 @@
       const large = data[0].length < 300 ? 3 : 0; // few points are drawn larger
       const shared = (what, y, drawn, height) => ({
         width: box.clientWidth, height, scales: { x: { time: false }, y }, axes: axes(panel.along[place], what),
-        cursor: { sync: { key: element.id }, drag: { x: true, y: false } }, legend: { markers: { width: 2 } }, ...drawn,
+        cursor: { sync: { key: element.id }, drag: { x: true, y: false } }, legend: { markers: { width: 2, stroke: (u, k) => u.series[k].stroke(u, k) } }, ...drawn,
       });
       const far = Math.max(...data[4].map((v) => Math.abs(v || 0)));
       const residuals = {

@@ -15,7 +15,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 MOST = 2400  # rows of an equation that a page shows, over all recordings
-STRETCHES, FEWEST = 60, 3  # of a coordinate that residuals are averaged in, and rows that each needs
+STRETCHES, FEWEST = 100, 3  # of a coordinate that residuals are averaged in, and rows that each needs
 STEPS = 65534  # of a quantised signal; the number beyond is a missing one
 BUTTONS = (("in", "zoom in", "+"), ("out", "zoom out", "−"), ("left", "move left", "←"), ("right", "move right", "→"),
            ("reset", "show everything", "all"))  # fmt: skip
@@ -31,6 +31,7 @@ class Curves:
     before, after : (row,) measured less predicted, in standard deviations
     deviation : (row,) a standard deviation, in the unit of ``measured``
     measured : (row,) the measured side of the equation; None where an equation has none
+    predicted : (row,) what is predicted of it before and after, where that is not ``measured`` less the residuals
     squares : r' V^-1 r of the residuals before and after, V the covariance of the noise
     aside : whether the recording was set aside for validation
     """
@@ -43,15 +44,21 @@ class Curves:
     measured: np.ndarray | None
     squares: tuple[float, float]
     aside: bool
+    predicted: tuple[np.ndarray, np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
 class Panel:
-    """An equation with its curves, recording by recording; ``quantity`` names its measured side with the unit."""
+    """An equation with its curves, recording by recording.
+
+    ``quantity`` names its measured side with the unit, ``first`` the coordinate that is shown at first, if not the
+    first one.
+    """
 
     equation: str
     quantity: str
     curves: Sequence[Curves]
+    first: str = ""
 
 
 def change(panel: Panel) -> float:
@@ -92,10 +99,12 @@ def markup(panel: Panel, name: str) -> str:
         "recordings": [_packed(c, share) for c in panel.curves],
         "means": [_means(panel.curves, p) for p in places],
     }  # fmt: skip
-    worst = int(np.argmax([_misfits([c])[0] for c in panel.curves]))
+    worst = int(np.argmax([_misfits([c])[0] for c in panel.curves])) if panel.first in ("", places[0]) else None
     names = [html.escape(c.recording.removesuffix(".nc") + (" (validation)" if c.aside else "")) for c in panel.curves]
     options = "".join(f'<option value="{k}"{" selected" * (k == worst)}>{n}</option>' for k, n in enumerate(names))
-    along = "".join(f'<option value="{k}">{html.escape(p)}</option>' for k, p in enumerate(places))
+    along = "".join(
+        f'<option value="{k}"{" selected" * (p == panel.first)}>{html.escape(p)}</option>' for k, p in enumerate(places)
+    )
     buttons = "".join(
         f'<button type="button" value="{value}" title="{title}" aria-label="{title}">{sign}</button>'
         for value, title, sign in BUTTONS
@@ -157,6 +166,8 @@ def _packed(curves: Curves, share: float) -> dict[str, Any]:
         "name": curves.recording, "along": [_quantised(x[rows]) for x in curves.along.values()],
         "measured": None if curves.measured is None else _quantised(curves.measured[rows]),
         "before": _quantised(curves.before[rows]), "after": _quantised(curves.after[rows]),
+        "smooth_before": None if curves.predicted is None else _quantised(curves.predicted[0][rows]),
+        "smooth_after": None if curves.predicted is None else _quantised(curves.predicted[1][rows]),
         "deviation": float(f"{sd[0]:.5g}") if len(sd) and np.ptp(sd) <= 1e-6 * sd[0] else _quantised(sd),
     }  # fmt: skip
 
