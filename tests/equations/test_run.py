@@ -64,7 +64,7 @@ def test_what_to_record_next_tells_two_readings_apart(verdict):
 
 def test_the_page_needs_nothing_else_and_says_the_finding(written):
     page = (written / "out" / "report.html").read_text()
-    assert "What these recordings cannot tell" in page and "Sealed before" in page
+    assert "What these recordings leave open" in page and "Sealed before" in page
     assert page.count("data:image/png;base64,") >= 3 and "http://" not in page and "https://" not in page
 
 

@@ -32,7 +32,7 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
         out.append(f"{text[0].upper()}{text[1:]} ({_fitted(first)}; posterior probability {first['probability']:.3g}).")
     if verdict["groups"]:
         names = "; ".join(" or ".join(g).replace("_", " ") for g in verdict["groups"])
-        out.append(f"One of a group that these recordings cannot tell apart: {names}.")
+        out.append(f"One of a group that these recordings do not distinguish: {names}.")
     if kind == "no_gap":
         p = first["probability"]
         out.append(
@@ -112,7 +112,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):
         page.paragraph(sentence, "lead")
-    page.heading("What these recordings cannot tell")
+    page.heading("What these recordings leave open")
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
     described = [d for d in verdict["discovered"] if d["form"] != "remainder"]
     if described:

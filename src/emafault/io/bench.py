@@ -140,7 +140,7 @@ def limits(recordings: Mapping[str, Recording], actuator: ActuatorParameters) ->
             variable="ambient_temperature",
         )
     if not any(r.health == "healthy" for r in recordings.values()):
-        say("no recording is called healthy: a fault and this unit's own tolerance are told apart by priors alone")
+        say("no recording is called healthy: a fault and this unit's own tolerance are distinguished by priors alone")
     turns = {
         d: any(np.maximum(d * np.diff(r.rotor_angle), 0.0).sum() > 10.0 for r in recordings.values()) for d in (1, -1)
     }

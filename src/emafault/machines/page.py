@@ -27,9 +27,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
         sizes = f": {_fitted(fitted)}" if 0 < len(fitted) <= TOLD else ""  # the table has them all
         out.append(f"{names[0].upper()}{names[1:]}{sizes}.")
     for group in verdict["groups"]:
-        out.append(f"One of a group that these recordings cannot tell apart: {_words(group)}.")
+        out.append(f"One of a group that these recordings do not distinguish: {_words(group)}.")
     if kind == "no_gap":
-        out.append(f"The base model accounts for these recordings (probability {first['probability']:.3g}).")
+        out.append(f"The base model accounts for these recordings (posterior probability {first['probability']:.3g}).")
     if kind == "unknown":
         out.append(
             f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
@@ -52,7 +52,7 @@ def cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
     grouped = {e for g in verdict["groups"] for e in g}
     for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
         if OPEN < p < 0.9 and effect not in grouped:
-            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+            out.append(f"{effect.replace('_', ' ')} has a posterior probability of {p:.2g}")
     if verdict["untold"]:
         out.append(f"of {', '.join(verdict['untold']).replace('_', ' ')} these recordings say nothing")
     return out or ["No listed effect is left between named and ruled out."]
@@ -74,7 +74,7 @@ def draw(found: Diagnosed) -> Page:
 def body(page: Page, found: Diagnosed, key: str, level: int = 3) -> None:
     """Tables and pictures of one diagnosis under headings of a level; ``key`` begins the names of its pictures."""
     verdict = found.verdict
-    page.heading("What these recordings cannot tell", level)
+    page.heading("What these recordings leave open", level)
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in cannot_tell(verdict)) + "</ul>")
     rows = [
         [w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:z.3g} to {w['to']:z.3g}",

@@ -140,7 +140,7 @@ def _discovered(fitted: "Fitted", found: Sequence[Mapping]) -> list[dict[str, An
         place: Mapping[str, Any] = next((w for w in found if w["equation"] == equation), {"along": "time"})
         text = f"The {equation.replace('_', ' ')} equation leaves more than noise"
         if "from" in place:
-            text += f", most of it at {place['along'].replace('_', ' ')} {place['from']:.3g} to {place['to']:.3g}"
+            text += f", most of it at {place['along'].replace('_', ' ')} {place['from']:z.3g} to {place['to']:z.3g}"
         out.append(
             {
                 "unit": left, "equation": equation, "along": place["along"], "form": "remainder",

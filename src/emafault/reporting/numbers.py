@@ -51,7 +51,7 @@ def as_told(found: Numbers, verdict: Mapping[str, Any], effects: Collection[str]
 
     ``effects``: those of the set that the numbers are of.
     """
-    of_set = next((e for e in verdict["which"] if set(e["effects"]) == set(effects)), {})
+    of_set: Mapping[str, Any] = next((e for e in verdict["which"] if set(e["effects"]) == set(effects)), {})
     told = {
         f"{p['effect'].replace('_', ' ')}: {n.rpartition('.')[2]}": p for n, p in of_set.get("parameters", {}).items()
     }

@@ -15,7 +15,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 MOST = 2400  # rows of an equation that a page shows, over all recordings
-STRETCHES, FEWEST = 100, 3  # of a coordinate that residuals are averaged in, and rows that each needs
+STRETCHES, FEWEST = 100, 8  # of a coordinate, with as many rows each, that residuals are averaged in; fewest rows
 STEPS = 65534  # of a quantised signal; the number beyond is a missing one
 BUTTONS = (("in", "zoom in", "+"), ("out", "zoom out", "−"), ("left", "move left", "←"), ("right", "move right", "→"),
            ("reset", "show everything", "all"))  # fmt: skip
@@ -148,15 +148,12 @@ def _misfits(curves: Sequence[Curves]) -> tuple[float, float]:
 def _means(curves: Sequence[Curves], place: str) -> dict[str, Any]:
     """Means of all rows' residuals in stretches of a coordinate, which show what the noise of single rows hides."""
     x = np.concatenate([c.along[place] for c in curves])
-    edges = np.linspace(np.min(x), np.max(x), STRETCHES + 1) if len(x) else np.arange(2.0)
-    at = np.clip(np.searchsorted(edges, x, "right") - 1, 0, len(edges) - 2)
-    count = np.bincount(at, minlength=len(edges) - 1)
-    full = count >= FEWEST
-    out = {"x": _quantised((0.5 * (edges[:-1] + edges[1:]))[full])}
-    for name in ("before", "after"):
-        total = np.bincount(at, np.concatenate([getattr(c, name) for c in curves]), len(count))
-        out[name] = _quantised(total[full] / count[full])
-    return out
+    shares = np.linspace(0.0, 1.0, int(np.clip(len(x) // FEWEST, 8, STRETCHES)) + 1)
+    edges = np.unique(np.quantile(x, shares)) if len(x) else np.zeros(0)
+    at = np.searchsorted(edges[1:-1], x, "right")
+    count = np.bincount(at)
+    columns = {"x": x, **{k: np.concatenate([getattr(c, k) for c in curves]) for k in ("before", "after")}}
+    return {k: _quantised(np.bincount(at, v)[count > 0] / count[count > 0]) for k, v in columns.items()}
 
 
 def _packed(curves: Curves, share: float) -> dict[str, Any]:
