@@ -22,7 +22,7 @@ def forward(
     dT_magnet: np.ndarray | None = None,
     eccentricity_law: str = "stator_fixed",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Resistances and back-EMF coefficients of given faults (seed paper eq. 8 and the fault laws of the README).
+    """Resistances and back-EMF coefficients of given faults (seed paper eq. 8 and the fault laws of docs/study.md).
 
     Parameters
     ----------

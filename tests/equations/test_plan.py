@@ -26,7 +26,9 @@ def verdict(folder, **changes):
 def test_a_motion_is_written_as_the_simulator_reads_it(tmp_path, capsys):
     assert main(["plan", verdict(tmp_path), "--out", str(tmp_path / "plan")]) == 0
     said = capsys.readouterr().out
-    assert "tells whether cogging acts as well, with odds of 12" in said and "1_sine.csv" in said
+    assert (
+        "distinguishes stribeck from stribeck with cogging, expected Bayes factor 12" in said and "1_sine.csv" in said
+    )
     position = read_command(tmp_path / "plan" / "1_sine.csv", 0.6, 1e-3)
     time = 1e-3 * np.arange(601)
     assert position[:601] == pytest.approx(0.04 * np.sin(4.0 * np.pi * time), abs=1e-9)
@@ -37,11 +39,13 @@ def test_a_bench_that_leaves_nothing_open_is_told_so(tmp_path, capsys):
     assert "Nothing to record" in capsys.readouterr().out
 
 
-def test_sets_are_told_apart_in_words():
+def test_sets_are_distinguished_in_words():
     assert separated(["stribeck", "cogging"]) == "stribeck from cogging"
     assert separated(["stribeck", "no_gap"]) == "stribeck from no gap"
-    assert separated(["no_gap", "bus_voltage"]) == "whether bus voltage acts"
-    assert separated(["stribeck", "bus_voltage+inertia+stribeck"]) == "whether bus voltage and inertia act as well"
+    assert separated(["no_gap", "bus_voltage"]) == "no gap from bus voltage"
+    assert (
+        separated(["stribeck", "bus_voltage+inertia+stribeck"]) == "stribeck from stribeck with bus voltage and inertia"
+    )
 
 
 @pytest.mark.parametrize(("text", "said"), [

@@ -1,6 +1,7 @@
 """A bench through the installed command: named, written, handed over, retrained with."""
 
 import json
+import re
 from dataclasses import replace
 
 import jsonschema
@@ -63,8 +64,24 @@ def test_what_to_record_next_tells_two_readings_apart(verdict):
 
 def test_the_page_needs_nothing_else_and_says_the_finding(written):
     page = (written / "out" / "report.html").read_text()
-    assert "What these recordings cannot tell" in page and "Sealed before" in page
+    assert "What these recordings leave open" in page and "Sealed before" in page
     assert page.count("data:image/png;base64,") >= 3 and "http://" not in page and "https://" not in page
+
+
+def test_the_page_has_a_chart_of_every_equation_and_every_fitted_number(written, verdict):
+    page = (written / "out" / "report.html").read_text()
+    for equation in ("electrical_a", "electrical_b", "electrical_c", "torque", "sensor_speed", "position", "control"):
+        assert f'id="panel_{equation}"' in page
+    for number in (
+        "magnet temperature: alpha_m",
+        "unit calibration: R_scale",
+        "inertia: scale",
+        "controller: speed gain",
+    ):
+        assert f">{number}</td>" in page
+    falls = re.search(r"Electrical a: the residual over the noise falls from ([\d.]+) to ([\d.]+)", page)
+    assert falls and float(falls[2]) < 1.1 < float(falls[1])
+    assert len(page) < 3e6
 
 
 def test_the_fix_is_an_experiment_that_composes(written, verdict):

@@ -19,7 +19,7 @@ from ..diagnosis.fit import NOTHING, Bench
 from ..diagnosis.model import SETTINGS
 from ..diagnosis.naming import read
 from ..effects.scaling import scaled
-from ..equations.diagnose import covariance
+from ..equations.diagnose import covariance_of
 from ..equations.machine import ReferenceActuator
 from ..equations.signals import Signals, estimated_noise
 from ..errors import InputError, shown
@@ -119,7 +119,7 @@ def _alone(bench: Bench) -> _Told:
     """What the numbers are where nothing else acts."""
     bench.settle(NOTHING)
     normal = bench.normal(bench.linearise(NOTHING), NOTHING)
-    return _told(bench, bench.values(), *covariance(bench, normal, NOTHING))
+    return _told(bench, bench.values(), *covariance_of(bench, normal, NOTHING))
 
 
 def _beside_causes(bench: Bench) -> tuple[_Told, tuple[str, ...]]:
@@ -133,7 +133,7 @@ def _beside_causes(bench: Bench) -> tuple[_Told, tuple[str, ...]]:
     left = [r.split(":", 1)[1] for r in reading.remainders if r.split(":", 1)[1] not in SETTINGS]
     words = [*reading.named, *(" or ".join(g) for g in reading.groups), *reading.forms]
     words += [f"more than noise in the {equation} equation" for equation in left]
-    return _told(bench, values, *covariance(bench, fit.normal, leading)), tuple(words)
+    return _told(bench, values, *covariance_of(bench, fit.normal, leading)), tuple(words)
 
 
 def _told(bench: Bench, values: Mapping[str, float], index: Mapping[str, int], spread: np.ndarray) -> _Told:

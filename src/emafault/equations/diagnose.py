@@ -49,6 +49,7 @@ class Diagnosed:
     fit: Fit
     reading: Reading
     leading: Model
+    before: Mapping[str, float]  # all parameters of the recalibrated nominal model
     values: Mapping[str, float]  # of all parameters at the leading set's fit
     noise: SensorNoise
 
@@ -186,7 +187,7 @@ def _diagnosed(
     verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
-    posterior = covariance(bench, fit.normal, best)
+    posterior = covariance_of(bench, fit.normal, best)
     after_values = bench.inserted(best, fit.normal).values
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
@@ -204,7 +205,7 @@ def _diagnosed(
         verdict["held_out"] = {e: round(r, 3) for e, r in held_out.ratios.items()}
     verdict["next_experiment"] = []
     verdict["warnings"] = []
-    return Diagnosed(verdict, bench, fit, reading, best, after_values, noise)
+    return Diagnosed(verdict, bench, fit, reading, best, before_point, after_values, noise)
 
 
 def _from_off(bench: Bench, model: Model) -> dict[str, float]:
@@ -388,7 +389,7 @@ def _controller(bench: Bench, fit: Fit, reading: Reading, values: Mapping[str, f
     return out
 
 
-def covariance(bench: Bench, normal: Normal, model: Model) -> tuple[dict[str, int], np.ndarray]:
+def covariance_of(bench: Bench, normal: Normal, model: Model) -> tuple[dict[str, int], np.ndarray]:
     """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
     names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
     k = np.array([normal.index[n] for n in names])

@@ -3,19 +3,19 @@
 import html
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..faults import FAULT_NAMES
+from ..reporting.numbers import Numbers, add_numbers
 from ..reporting.page import Page
+from ..reporting.panels import Panel
 from ..reporting.retrained import MARKS
 from .electrical import NAMES
-from .quality import CHANNELS
+from .quality import in_cells
 from .telling import differing_gains
 from .terms import TERMS
 
-ROWS = 12  # recordings in the picture of their quality
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
 MOST = 8  # sets in the table
@@ -29,14 +29,15 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     if kind in ("explained", "partly") and first["effects"]:
         sentences = [TERMS[e].SENTENCE for e in first["effects"] if e in TERMS]
         text = "; ".join(sentences)
-        out.append(f"{text[0].upper()}{text[1:]} ({_fitted(first)}; probability {first['probability']:.3g}).")
+        out.append(f"{text[0].upper()}{text[1:]} ({_fitted(first)}; posterior probability {first['probability']:.3g}).")
     if verdict["groups"]:
         names = "; ".join(" or ".join(g).replace("_", " ") for g in verdict["groups"])
-        out.append(f"One of a group that these recordings cannot tell apart: {names}.")
+        out.append(f"One of a group that these recordings do not distinguish: {names}.")
     if kind == "no_gap":
         p = first["probability"]
         out.append(
-            f"The nominal model within the unit's tolerances accounts for these recordings (probability {p:.3g})."
+            "The nominal model within the unit's tolerances accounts for these recordings "
+            f"(posterior probability {p:.3g})."
         )
     if kind == "unknown":
         out.append(
@@ -51,9 +52,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     if signal and signal["closed"] is not None:
         share = 100 * min(signal["closed"], 1.0)
         out.append(
-            f"On recordings not looked at before this closes {share:.0f} % of the gap."
+            f"On the validation recordings this closes {share:.0f} % of the gap."
             if share > 0.0
-            else "On recordings not looked at before this closes nothing of the gap."
+            else "On the validation recordings this closes nothing of the gap."
         )
     return out
 
@@ -91,11 +92,19 @@ def _fitted(entry: Mapping[str, Any]) -> str:
     parts = []
     for name, p in entry["parameters"].items():
         units = "" if p["units"] == "1" else f" {p['units']}"
-        parts.append(f"{name} = {p['value']:.4g}{units} ({p['low']:.4g} to {p['high']:.4g})")
+        parts.append(f"{name} = {p['value']:z.4g}{units} ({p['low']:z.4g} to {p['high']:z.4g})")
     return ", ".join(parts)
 
 
-def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) -> Page:
+@dataclass(frozen=True)
+class Detail:
+    """What the page shows beside the verdict: charts of the equations and every fitted number."""
+
+    panels: Sequence[Panel]
+    numbers: Numbers
+
+
+def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, detail: Detail | None = None) -> Page:
     """The page of one diagnosis."""
     # what draws takes half a second to import, and the verdict does not wait
     from ..reporting import diagnosis as figures
@@ -103,7 +112,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):
         page.paragraph(sentence, "lead")
-    page.heading("What these recordings cannot tell")
+    page.heading("What these recordings leave open")
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
     described = [d for d in verdict["discovered"] if d["form"] != "remainder"]
     if described:
@@ -127,39 +136,53 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
             )  # fmt: skip
     page.heading("How good the recordings are")
     page.figure(
-        "quality", figures.draw_quality(*_quality(verdict["quality"])),
+        "quality", figures.draw_quality(*in_cells(verdict["quality"])),
         "Noise of each channel (of the voltages, with the inverter's ripple), coloured by how it compares with that of "
         "most recordings (orange: more), and what share of the samples is no measurement.",
     )  # fmt: skip
     page.heading("Where: residual by equation and operating region")
     rows = [
         [
-            w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}",
+            w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:z.3g} to {w['to']:z.3g}",
             f"{w['z']:.3g}", f"{w['share']:.1%}",
         ]
         for w in verdict["where"]
     ]  # fmt: skip
     page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
-    page.heading("Which: posterior probability")
+    if detail is not None:
+        page.heading("Measured and predicted, equation by equation")
+        page.paragraph(
+            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. "
+            "Residuals are in standard deviations; of noise alone, nineteen in twenty lie in the shaded band. Drag to "
+            "zoom in, double-click to see everything."
+        )
+        page.panels(detail.panels)
+    page.heading("Which: posterior probability of each set of effects")
     about = (
-        "Probabilities are exclusive and sum to one. The gain is that of all recordings fitted together: what the "
-        "confirming recordings, or another size in each recording, speak against has lost its probability all the same."
+        "Posterior probabilities are exclusive and sum to one. The gain is that of all recordings fitted together: "
+        "what the validation recordings, or another size in each recording, speak against has lost its probability all "
+        "the same."
     )
-    page.figure("which", figures.draw_ranking(ranked(verdict)), about)
+    entries = ranked(verdict)
+    page.figure(
+        "which", figures.draw_ranking(entries), about,
+        "; ".join(f"{e['label']}: {100 * e['probability']:.1f} %" for e in entries),
+    )  # fmt: skip
     rows = [
         [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
         for m, e in enumerate(verdict["which"][:MOST])
         if e.get("parameters") and (m == 0 or e["probability"] >= TOLD_OF)
     ]
     if rows:
-        page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows, (0,))
+        page.table(["set of effects", "posterior probability", "parameters with 90 % intervals"], rows, (0,))
     if any(verdict["shrinks"].values()):
-        page.heading("How far the gap shrinks")
+        page.heading("How far the gap closes on the validation recordings")
         page.figure(
             "how_far",
             figures.draw_ladder(verdict["shrinks"]),
             "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: tolerances fitted. "
             "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
+            figures.ladder_in_words(verdict["shrinks"]),
         )
     page.heading("Controller")
     rows = [
@@ -173,6 +196,8 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
         for n, g in verdict["controller"].items()
     ]
     page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
+    if detail is not None:
+        add_numbers(page, detail.numbers)
     if verdict["fault_vector"]:
         page.heading("Fault vector before and after")
         page.figure(
@@ -189,24 +214,22 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str) 
         ]
         for e in verdict["next_experiment"]
     ]  # fmt: skip
-    page.table(["command", "soak", "would tell", "expected odds"], rows)
-    page.heading("Sealed before the confirming recordings were opened")
+    page.table(["command", "ambient temperature", "distinguishes", "expected Bayes factor"], rows)
+    page.heading("Sealed before the validation recordings were opened")
     page.parts.append(f"<pre>{html.escape(json.dumps(verdict['sealed'], indent=1))}</pre>")
     return page
 
 
 def separated(sets: Sequence[str]) -> str:
-    """What a recording would tell: the leading set from a rival, each as the verdict file joins its effects."""
+    """What a recording distinguishes: the leading set from a rival, each as the verdict file joins its effects."""
     first, rival = (s.split("+") for s in sets)
+    leading = _joined(first)
     more = [e for e in rival if e not in first]
-    words = {
-        k: " and ".join(e.replace("_", " ") for e in v) for k, v in (("one", first), ("two", rival), ("more", more))
-    }
-    if set(first) < set(rival) or first == ["no_gap"]:
-        return f"whether {words['more']} act{'s' if len(more) == 1 else ''}" + (
-            " as well" if set(first) < set(rival) else ""
-        )
-    return f"{words['one']} from {words['two'] if rival != ['no_gap'] else 'no gap'}"
+    return f"{leading} from {f'{leading} with {_joined(more)}' if set(first) < set(rival) else _joined(rival)}"
+
+
+def _joined(effects: Sequence[str]) -> str:
+    return " and ".join(e.replace("_", " ") for e in effects)
 
 
 def ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -231,34 +254,6 @@ def ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     return out
 
 
-def _quality(quality: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[list[str], list[str], list[list[dict]]]:
-    """Rows, columns and cells of the picture of the recordings' quality, the worst recordings of many."""
-    channels = [c for c in CHANNELS if any(c in q for q in quality.values())]
-    most = {c: float(np.median([q[c]["noise"] for q in quality.values() if c in q])) for c in channels}
-    rows = {name: [_cell(q.get(c), c, most[c]) for c in channels] for name, q in quality.items()}
-    worst = sorted(rows, key=lambda n: (-sum(c["fault"] for c in rows[n]), -max(c["relative"] for c in rows[n])))
-    shown = [n for n in rows if n in set(worst[:ROWS])]
-    titles = [CHANNELS[c][1] for c in channels]
-    return shown, titles, [rows[n] for n in shown]
-
-
-def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[str, Any]:
-    if found is None:
-        return {"text": "not recorded", "relative": 1.0, "fault": False}
-    units = CHANNELS[channel][2]
-    faults = [
-        text.format(100.0 * found[k] if share else found[k], units)
-        for k, share, text in (
-            ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
-            ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
-        )
-        if k in found
-    ]  # fmt: skip
-    noise = f"{found['noise']:.2g} {units}"
-    relative = found["noise"] / most if most > 0.0 else 1.0
-    return {"text": ", ".join(faults) or noise, "relative": relative, "fault": bool(faults)}
-
-
 def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
     """What is left open: groups, and listed effects neither named nor ruled out."""
     out = [f"{' or '.join(g).replace('_', ' ')}: one of them acts" for g in verdict["groups"]]
@@ -266,7 +261,7 @@ def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
     named = set(verdict["which"][0]["effects"])
     for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
         if OPEN < p < 0.9 and effect not in grouped | named:
-            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+            out.append(f"{effect.replace('_', ' ')} has a posterior probability of {p:.2g}")
     return out or ["No listed effect is left between named and ruled out."]
 
 

@@ -53,8 +53,8 @@ def plan(path: str | Path, spec: Mapping[str, Any], out: str | Path | None = Non
 def sentences(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """What to record next, a line each, numbered; one line that says so where there is nothing."""
     return [
-        f"{n}. {entry['command']}, soaked at {entry['ambient_temperature']:g} degC: tells "
-        f"{separated(entry['separates'])}, with odds of {entry['expected_odds']:.3g}"
+        f"{n}. {entry['command']}, ambient temperature {entry['ambient_temperature']:g} degC: distinguishes "
+        f"{separated(entry['separates'])}, expected Bayes factor {entry['expected_odds']:.3g}"
         for n, entry in enumerate(entries, start=1)
     ] or ["Nothing to record: no other reading of these recordings is left."]
 

@@ -18,6 +18,7 @@ CHANNELS = {
     "bus_voltage": ("bus", "bus voltage", "V", "bus_voltage"),
     "output_position": ("position", "output position", "rad", "output"),
 }
+ROWS = 12  # recordings in the picture of their quality
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
 HELD = 3  # samples equal to the one before, which a channel with noise never shows
@@ -132,3 +133,31 @@ def _entry(
         "parameters": {parameter: {"value": value, "low": value, "high": value, "units": units}},
         "recordings": list(names), "sentence": sentence,
     }  # fmt: skip
+
+
+def in_cells(quality: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[list[str], list[str], list[list[dict]]]:
+    """Rows, columns and cells of the picture of the recordings' quality, the worst recordings of many."""
+    channels = [c for c in CHANNELS if any(c in q for q in quality.values())]
+    most = {c: float(np.median([q[c]["noise"] for q in quality.values() if c in q])) for c in channels}
+    rows = {name: [_cell(q.get(c), c, most[c]) for c in channels] for name, q in quality.items()}
+    worst = sorted(rows, key=lambda n: (-sum(c["fault"] for c in rows[n]), -max(c["relative"] for c in rows[n])))
+    shown = [n for n in rows if n in set(worst[:ROWS])]
+    titles = [CHANNELS[c][1] for c in channels]
+    return shown, titles, [rows[n] for n in shown]
+
+
+def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[str, Any]:
+    if found is None:
+        return {"text": "not recorded", "relative": 1.0, "fault": False}
+    units = CHANNELS[channel][2]
+    faults = [
+        text.format(100.0 * found[k] if share else found[k], units)
+        for k, share, text in (
+            ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
+            ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
+        )
+        if k in found
+    ]  # fmt: skip
+    noise = f"{found['noise']:.2g} {units}"
+    relative = found["noise"] / most if most > 0.0 else 1.0
+    return {"text": ", ".join(faults) or noise, "relative": relative, "fault": bool(faults)}

@@ -16,9 +16,11 @@ from ..plain import read_yaml
 from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
+from .curves import panels
 from .diagnose import Diagnosed, diagnose
+from .fitted import numbers
 from .handover import experiment_text
-from .page import draw, finding
+from .page import Detail, draw, finding
 
 PROCESSES = 2
 
@@ -117,7 +119,8 @@ def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path |
     text = experiment_text(verdict, verdict["simulator"]["after"], name, _differing(found.bench.machine.actuator))
     last = checked(verdict)
     truths = {n: r.fault for n, r in bench.recordings.items()}
-    draw(verdict, truths, section(folder, verdict)).write(folder / REPORT)
+    detail = Detail(panels(found), numbers(found))
+    draw(verdict, truths, section(folder, verdict), detail).write(folder / REPORT)
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)

@@ -214,6 +214,6 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         unit = "" if knots[0][1] == "1" else f" {knots[0][1]}"
         says = (
             f"{what} goes with the {along.replace('_', ' ')} from {of('from')} to {of('to')}, "
-            f"between {low:.3g} and {high:.3g}{unit}"
+            f"between {low:z.3g} and {high:z.3g}{unit}"
         )
     return f"{place}: {says}."

@@ -131,16 +131,16 @@ def limits(recordings: Mapping[str, Recording], actuator: ActuatorParameters) ->
         out.append(_warning("limits", message, file, variable))
 
     if len(recordings) == 1:
-        say("a single recording: nothing is held out, so that how far the gap shrinks cannot be checked")
+        say("a single recording: none is left for validation, so that how far the gap closes cannot be checked")
     ambient = [r.ambient_temperature for r in recordings.values()]
     if np.ptp(ambient) < 15.0:
         say(
-            f"all recordings were soaked within {np.ptp(ambient):.1f} K: what depends on temperature cannot be told "
-            "from what does not",
+            f"all ambient temperatures lie within {np.ptp(ambient):.1f} K: what depends on temperature cannot be "
+            "distinguished from what does not",
             variable="ambient_temperature",
         )
     if not any(r.health == "healthy" for r in recordings.values()):
-        say("no recording is called healthy: a fault and this unit's own tolerance are told apart by priors alone")
+        say("no recording is called healthy: a fault and this unit's own tolerance are distinguished by priors alone")
     turns = {
         d: any(np.maximum(d * np.diff(r.rotor_angle), 0.0).sum() > 10.0 for r in recordings.values()) for d in (1, -1)
     }

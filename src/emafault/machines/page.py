@@ -5,12 +5,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from ..reporting import diagnosis as figures
+from ..reporting.numbers import add_numbers
 from ..reporting.page import Page
-from ..reporting.residuals import Panel, draw_residuals
 from .diagnose import Diagnosed
+from .shown import numbers, panels
 
 MOST = 8  # sets in the table
 TOLD = 6  # parameters in a sentence
@@ -28,9 +27,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
         sizes = f": {_fitted(fitted)}" if 0 < len(fitted) <= TOLD else ""  # the table has them all
         out.append(f"{names[0].upper()}{names[1:]}{sizes}.")
     for group in verdict["groups"]:
-        out.append(f"One of a group that these recordings cannot tell apart: {_words(group)}.")
+        out.append(f"One of a group that these recordings do not distinguish: {_words(group)}.")
     if kind == "no_gap":
-        out.append(f"The base model accounts for these recordings (probability {first['probability']:.3g}).")
+        out.append(f"The base model accounts for these recordings (posterior probability {first['probability']:.3g}).")
     if kind == "unknown":
         out.append(
             f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
@@ -41,9 +40,9 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
     if signal and signal["closed"] is not None and kind != "no_gap":
         share = 100 * signal["closed"]
         said = f"closes {share:.0f} % of the gap" if share > 0.5 else "leaves all of the gap, or more"
-        out.append(f"On recordings not looked at before, what was sealed {said}.")
+        out.append(f"On the validation recordings, what was sealed {said}.")
     if held["outcome"] in ("contradicted", "rival"):
-        out.append("The recordings set aside changed what is claimed: the seal says what was found before.")
+        out.append("The validation recordings changed what is claimed: the seal says what was found before.")
     return out
 
 
@@ -53,7 +52,7 @@ def cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
     grouped = {e for g in verdict["groups"] for e in g}
     for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
         if OPEN < p < 0.9 and effect not in grouped:
-            out.append(f"{effect.replace('_', ' ')} has a probability of {p:.2g}")
+            out.append(f"{effect.replace('_', ' ')} has a posterior probability of {p:.2g}")
     if verdict["untold"]:
         out.append(f"of {', '.join(verdict['untold']).replace('_', ' ')} these recordings say nothing")
     return out or ["No listed effect is left between named and ruled out."]
@@ -66,69 +65,55 @@ def draw(found: Diagnosed) -> Page:
         page.paragraph(sentence, "lead")
     for note in found.verdict["notes"]:
         page.paragraph(note, "small")
-    body(page, found, "")
-    page.heading("Sealed before the recordings set aside were opened")
+    body(page, found, "", 2)
+    page.heading("Sealed before the validation recordings were opened")
     page.parts.append(f"<pre>{html.escape(json.dumps(found.verdict['sealed'], indent=1))}</pre>")
     return page
 
 
-def body(page: Page, found: Diagnosed, key: str) -> None:
-    """Tables and pictures of one diagnosis; ``key`` begins the names of its pictures."""
+def body(page: Page, found: Diagnosed, key: str, level: int = 3) -> None:
+    """Tables and pictures of one diagnosis under headings of a level; ``key`` begins the names of its pictures."""
     verdict = found.verdict
-    page.figure(
-        f"{key}residuals",
-        draw_residuals(panels(found)),
-        "Residuals before (grey) and with the leading set (blue); filled: explored, hollow: set aside.",
-    )
+    page.heading("What these recordings leave open", level)
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in cannot_tell(verdict)) + "</ul>")
+    rows = [
+        [w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:z.3g} to {w['to']:z.3g}",
+         f"{w['z']:.3g}", f"{w['share']:.1%}"]
+        for w in verdict["where"]
+    ]  # fmt: skip
+    if rows:
+        page.heading("Residual by equation and operating region", level)
+        page.table(["equation", "along", "most of it lies at", "size over the noise", "share"], rows)
+    page.heading("Measured and predicted, equation by equation", level)
+    page.paragraph(
+        "Before is the base model fitted by itself, after the leading set of effects. Residuals are in standard "
+        "deviations; of noise alone, nineteen in twenty lie in the shaded band."
+    )
+    page.panels(panels(found), key)
     rows = [
         [" + ".join(e["effects"]).replace("_", " "), f"{e['probability']:.4f}", _fitted(e.get("parameters", {}))]
         for e in verdict["which"][:MOST]
         if e["probability"] > 0.0005 and e["effects"]
     ]
     if rows:
-        page.table(["set of effects", "probability", "parameters with 90 % intervals"], rows)
-    rows = [
-        [w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:.3g} to {w['to']:.3g}",
-         f"{w['z']:.3g}", f"{w['share']:.1%}"]
-        for w in verdict["where"]
-    ]  # fmt: skip
-    if rows:
-        page.table(["where", "along", "most of it lies at", "size over the noise", "share"], rows)
+        page.heading("Posterior probability of each set of effects", level)
+        page.table(["set of effects", "posterior probability", "parameters with 90 % intervals"], rows)
     if verdict["shrinks"]["signal"]:
+        page.heading("How far the gap closes on the validation recordings", level)
         page.figure(
             f"{key}how_far",
             figures.draw_ladder(verdict["shrinks"]),
-            "Residual on the recordings set aside, everything frozen. Placebo: random signatures of equal freedom.",
+            "Residual on the validation recordings, everything frozen. Placebo: random signatures of equal freedom.",
+            figures.ladder_in_words(verdict["shrinks"]),
         )
-    base = verdict["base"]
-    if base:
-        rows = [
-            [n, *(f"{b[s]['value']:.4g} ({b[s]['low']:.4g} to {b[s]['high']:.4g})" for s in ("before", "after")),
-             b["after"]["units"]]
-            for n, b in base.items()
-        ]  # fmt: skip
-        page.table(["base model", "without", "with the leading set", "unit"], rows)
+    add_numbers(page, numbers(found), level)
     rows = [
         [e["command"], _words(e["separates"], " from ").replace("+", " + "), f"{e['expected_odds']:.3g}"]
         for e in verdict["next_experiment"]
     ]
     if rows:
-        page.table(["to record next", "would tell", "expected odds"], rows)
-
-
-def panels(found: Diagnosed) -> list[Panel]:
-    """Residuals of every equation and recording, each row over its own standard deviation."""
-    whole, at = found.whole, found.whole.settled
-    out: list[Panel] = []
-    for rows in found.machine.rows:
-        deviation = np.sqrt(np.diag(rows.covariance))
-        general = [{n: v for n, v in p.items() if "@" not in n} for p in (whole.base(), at.values)]
-        before, after = (rows.observed - whole.recorded.predict(rows, general)) / deviation
-        place = 0.5 * (rows.low + rows.high)
-        along = found.machine.words.get(rows.along, rows.along)
-        out.append((rows.equation, along, place, before, after, rows.recording in found.machine.confirm))
-    return out
+        page.heading("What to record next", level)
+        page.table(["recording", "distinguishes", "expected Bayes factor"], rows)
 
 
 def _words(names, between: str = " or ") -> str:
@@ -139,5 +124,5 @@ def _fitted(parameters: Mapping[str, Any]) -> str:
     parts = []
     for name, p in parameters.items():
         units = "" if p.get("units", "1") == "1" else f" {p['units']}"
-        parts.append(f"{name} = {p['value']:.4g}{units} ({p['low']:.4g} to {p['high']:.4g})")
+        parts.append(f"{name} = {p['value']:z.4g}{units} ({p['low']:z.4g} to {p['high']:z.4g})")
     return ", ".join(parts)

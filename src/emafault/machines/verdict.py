@@ -140,7 +140,7 @@ def _discovered(fitted: "Fitted", found: Sequence[Mapping]) -> list[dict[str, An
         place: Mapping[str, Any] = next((w for w in found if w["equation"] == equation), {"along": "time"})
         text = f"The {equation.replace('_', ' ')} equation leaves more than noise"
         if "from" in place:
-            text += f", most of it at {place['along'].replace('_', ' ')} {place['from']:.3g} to {place['to']:.3g}"
+            text += f", most of it at {place['along'].replace('_', ' ')} {place['from']:z.3g} to {place['to']:z.3g}"
         out.append(
             {
                 "unit": left, "equation": equation, "along": place["along"], "form": "remainder",
@@ -152,15 +152,23 @@ def _discovered(fitted: "Fitted", found: Sequence[Mapping]) -> list[dict[str, An
     return out
 
 
-def _base(fitted: "Fitted") -> dict[str, dict[str, Any]]:
-    """Parameters of the base model before and after, with 90 % intervals."""
+def covariance_of(fitted: "Fitted") -> tuple[list[str], np.ndarray]:
+    """Parameters of the base model and of the leading set, and their posterior covariance."""
     bench, normal = fitted.bench, fitted.fit.normal
-    before, after, model = fitted.base(), fitted.settled.values, fitted.leading
-    names = [*bench.nuisances, *(n for n in model.deviations if n in normal.index and is_parameter(n))]
+    own = (n for n in fitted.leading.deviations if n in normal.index and is_parameter(n))
+    names = [*bench.nuisances, *own]
     k = np.array([normal.index[n] for n in names])
     sd = np.array([bench.prior(n)[1] for n in names])
     A = normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
-    spread = dict(zip(names, np.sqrt(np.diag(np.linalg.inv(A))) * sd, strict=True))
+    return names, np.linalg.inv(A) * np.outer(sd, sd)
+
+
+def _base(fitted: "Fitted") -> dict[str, dict[str, Any]]:
+    """Parameters of the base model before and after, with 90 % intervals."""
+    bench = fitted.bench
+    before, after = fitted.base(), fitted.settled.values
+    names, covariance = covariance_of(fitted)
+    spread = dict(zip(names, np.sqrt(np.diag(covariance)), strict=True))
     out = {}
     for n in bench.nuisances:
         if n in fitted.recorded.short:

@@ -80,7 +80,7 @@ def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.F
     units = {
         "signal": "misfit over noise (rms)",
         "features": "R, k error over noise (rms)",
-        "fault_vector": "fault error over its standard error (rms)",
+        "fault_vector": "error / standard error (rms)",
     }
     for ax, (kind, rung) in zip(axes[0], shown.items()):
         present = [n for n in names if rung.get(n) is not None]
@@ -102,6 +102,16 @@ def draw_ladder(rungs: Mapping[str, Mapping[str, float | None] | None]) -> plt.F
         ax.set_ylabel(units[kind])
         ax.grid(axis="x", visible=False)
     return fig
+
+
+def ladder_in_words(rungs: Mapping[str, Mapping[str, float | None] | None]) -> str:
+    """What the ladder shows, for who cannot see it."""
+    said = [
+        f"{kind.replace('_', ' ')}: {', '.join(f'{name} {v:.3g}' for name, v in rung.items() if v is not None)}"
+        for kind, rung in rungs.items()
+        if rung
+    ]
+    return f"Misfit over the noise. {'; '.join(said)}."
 
 
 def draw_faults(groups: Sequence[Mapping[str, Any]]) -> plt.Figure:

@@ -3,23 +3,16 @@
 import base64
 import html
 import io
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..io.atomic import replace_atomically, write_text
+from . import panels as charts
 
-_STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1d1f21; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
-p.lead { font-size: 1.08rem; } p.small, figcaption { color: #555; font-size: .9rem; }
-figure { margin: 1.2rem 0; } figure img { max-width: 100%; height: auto; }
-.scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: .92rem; margin: .8rem 0; }
-th, td { padding: .28rem .5rem; text-align: right; border-bottom: 1px solid #e3e3e3; white-space: nowrap; }
-th { border-bottom: 2px solid #888; white-space: normal; vertical-align: bottom; }
-th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 9rem; }
-td.words, th.words { text-align: left; } td.words { white-space: normal; max-width: 22rem; }
-tr.strong td { font-weight: 600; } pre { background: #f6f6f4; padding: .8rem; overflow-x: auto; font-size: .82rem; }
-"""
+STYLE = Path(__file__).with_name("page.css")
+CONTENTS = 3  # headings from which on a page has a bar of contents
 
 
 class Page:
@@ -29,10 +22,19 @@ class Page:
         self.title = title
         self.folder = Path(figures) if figures else None
         self.parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
+        self.headings: dict[str, str] = {}  # by id
+        self.charts = False
 
-    def heading(self, text: str) -> None:
-        """A section's heading."""
-        self.parts.append(f"<h2>{html.escape(text)}</h2>")
+    def heading(self, text: str, level: int = 2) -> None:
+        """A section's heading; the bar of contents leads to those of level 2."""
+        if level != 2:
+            self.parts.append(f"<h{level}>{html.escape(text)}</h{level}>")
+            return
+        name = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+        while name in self.headings:
+            name += "-"
+        self.headings[name] = text
+        self.parts.append(f'<h2 id="{name}">{html.escape(text)}</h2>')
 
     def paragraph(self, text: str, kind: str = "") -> None:
         """Plain text; ``kind`` is ``lead`` or ``small``."""
@@ -49,15 +51,38 @@ class Page:
             for n in range(len(header))
         ]
         kind = [" class=words" if words else "" for words in lettered]
-        head = "".join(f"<th{k}>{html.escape(cell)}</th>" for k, cell in zip(kind, header, strict=True))
+        head = "".join(f"<th scope=col{k}>{html.escape(cell)}</th>" for k, cell in zip(kind, header, strict=True))
         lines = []
         for n, row in enumerate(rows):
             cells = "".join(f"<td{k}>{html.escape(cell)}</td>" for k, cell in zip(kind, row, strict=False))
             lines.append(f"<tr{' class=strong' if n in strong else ''}>{cells}</tr>")
-        self.parts.append(f'<div class="scroll"><table><tr>{head}</tr>{"".join(lines)}</table></div>')
+        label = html.escape(", ".join(header[:3]))
+        body = f"<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody>"
+        self.parts.append(
+            f'<div class="scroll" role="region" aria-label="table: {label}" tabindex="0"><table>{body}</table></div>'
+        )
 
-    def figure(self, name: str, drawing, caption: str) -> None:
-        """A matplotlib figure, which is closed afterwards."""
+    @contextmanager
+    def folded(self, title: str) -> Iterator[None]:
+        """What is added within is shown when the reader opens it."""
+        self.parts.append(f"<details><summary>{html.escape(title)}</summary>")
+        yield
+        self.parts.append("</details>")
+
+    def panels(self, panels: Sequence[charts.Panel], key: str = "") -> None:
+        """Interactive charts, one an equation, what changes most first, and a table that says the same.
+
+        ``key`` begins their names.
+        """
+        if not panels:
+            return
+        panels = sorted(panels, key=charts.change, reverse=True)
+        self.table(["equation", "rows", "residual over the noise (rms), before", "after"], charts.table(panels))
+        self.parts += [charts.markup(panel, name) for name, panel in charts.numbered(panels, key)]
+        self.charts = True
+
+    def figure(self, name: str, drawing, caption: str, result: str = "") -> None:
+        """A matplotlib figure, which is closed afterwards; ``result`` says to who cannot see it what it shows."""
         import matplotlib.pyplot as plt
 
         buffer = io.BytesIO()
@@ -68,7 +93,8 @@ class Page:
             replace_atomically(self.folder / f"{name}.png", lambda temporary: temporary.write_bytes(data))
         image = base64.b64encode(data).decode()
         text = html.escape(caption)
-        picture = f'<img alt="{text}" src="data:image/png;base64,{image}">'
+        alternative = html.escape(result or caption)
+        picture = f'<img alt="{alternative}" src="data:image/png;base64,{image}">'
         self.parts.append(f'<figure id="{name}">{picture}<figcaption>{text}</figcaption></figure>')
 
     def write(self, path: str | Path) -> None:
@@ -78,6 +104,16 @@ class Page:
         ------
         InputError : the file cannot be written
         """
-        head = f'<meta charset="utf-8"><title>{html.escape(self.title)}</title><style>{_STYLE}</style>'
-        text = f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(self.parts)}</body></html>\n'
-        write_text(path, text)
+        style = STYLE.read_text() + (charts.styles() if self.charts else "")
+        view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        head = f'<meta charset="utf-8">{view}<title>{html.escape(self.title)}</title><style>{style}</style>'
+        body = (
+            f'{self._contents()}<main id="main">{"".join(self.parts)}</main>{charts.scripts() if self.charts else ""}'
+        )
+        write_text(path, f'<!doctype html><html lang="en"><head>{head}</head><body>{body}</body></html>\n')
+
+    def _contents(self) -> str:
+        if len(self.headings) < CONTENTS:
+            return ""
+        links = "".join(f'<li><a href="#{name}">{html.escape(text)}</a></li>' for name, text in self.headings.items())
+        return f'<a class="skip" href="#main">Skip to the content</a><nav aria-label="Contents"><ol>{links}</ol></nav>'

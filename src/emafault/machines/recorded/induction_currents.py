@@ -119,7 +119,7 @@ def recordings(arrays: Arrays) -> Found:
     notes = [f"phase sequence {'A B C' if order > 0 else 'A C B'}"]
     observed: dict[str, dict[str, float]] = {}
     if "healthy" not in arrays:
-        notes.append("no healthy recording: supply unbalance and a shorted phase are told apart by size alone")
+        notes.append("no healthy recording: supply unbalance and a shorted phase are distinguished by size alone")
     elif _order(arrays["healthy"][0]) != order:
         # of a healthy machine with two leads exchanged the size of the unbalance is known, not where it points
         spread, unbalance, zero = float(np.hypot(abs(unbalance), spread)), 0j, 0j

@@ -1,0 +1,62 @@
+"""The fitted numbers of a diagnosis of the reference actuator, with their posterior correlation."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..diagnosis.point import is_parameter
+from ..effects import EFFECTS
+from ..reporting.numbers import Number, Numbers, as_told
+from .diagnose import CONTROLLER, Diagnosed, covariance_of
+
+
+def numbers(found: Diagnosed) -> Numbers:
+    """Every nuisance and parameter of the leading set; what lies beyond a tolerance is added to its quantity."""
+    bench, model = found.bench, found.leading
+    index, covariance = covariance_of(bench, found.fit.normal, model)
+    own = [n for n in model.deviations if is_parameter(n) and bench.parameters[n].secant is None]
+    beyond: dict[str, list[str]] = {}
+    for n in own:
+        alias = bench.parameters[n].alias
+        if alias is not None:
+            beyond.setdefault(alias, []).append(n)
+    names = [*(n for n in own if bench.parameters[n].alias is None), *bench.nuisances]
+    out, mix = [], np.zeros((len(names), len(index)))
+    for row, n in enumerate(names):
+        p = bench.parameters[n]
+        mix[row, [index[k] for k in (n, *beyond.get(n, ())) if k in index]] = 1.0
+        sd = float(np.sqrt(mix[row] @ covariance @ mix[row]))
+        kind = "effect" if n in own or n in beyond else _kind(n)
+        one = Number(_words(n), kind, p.off, found.values[n], sd, bench.prior(n)[1], _units(n, p.units))
+        out.append(_of_logarithm(one) if ": log_" in one.name else one)
+    whole = mix @ covariance @ mix.T
+    width = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    listed = [u for u in model.units if u in EFFECTS]
+    return as_told(Numbers(out, whole / np.outer(width, width)), found.verdict, listed)
+
+
+def _units(name: str, units: str) -> str:
+    group, _, short = name.partition(".")
+    listed = EFFECTS[group].parameters if group in EFFECTS else {}
+    known = listed.get(short.removeprefix("log_").partition("@")[0])
+    return known.units if known else CONTROLLER.get(short, units)
+
+
+def _of_logarithm(n: Number) -> Number:
+    """The number itself, where its logarithm was fitted."""
+    value = float(np.exp(n.value))
+    return replace(
+        n, name=n.name.replace("log_", ""), start=float(np.exp(n.start)), value=value, sd=value * n.sd,
+        prior=value * n.prior,
+    )  # fmt: skip
+
+
+def _kind(name: str) -> str:
+    return "recording" if "@" in name else "controller" if name.startswith("controller.") else "unit"
+
+
+def _words(name: str) -> str:
+    name, _, recording = name.partition("@")
+    group, _, short = name.rpartition(".")
+    words = f"{group.replace('_', ' ')}: {short}" if group else short
+    return f"{words}, {recording.removesuffix('.nc')}" if recording else words
