@@ -121,6 +121,15 @@ def test_a_current_that_flows_on_makes_torque():
     assert abs(x @ left) / np.sqrt(x @ x) < 3.0
 
 
+def test_beyond_its_plateau_a_phase_makes_less_torque():
+    given = {"hall_displacement": {"d_a": -4.6, "d_b": -4.6, "d_c": -0.3}}
+    recording = recorded("reversal", effects=given)
+    machine = machine_of({"a.nc": recording})
+    block = next(b for b in machine.blocks(truth(machine, recording, given), "a.nc") if b.equation == "torque")
+    x, left = whiten(block.bands, block.usable, np.array([block.coordinates["drivers"][2], block.residual]).T).T
+    assert abs(x @ left) / np.sqrt(x @ x) < 3.0
+
+
 @pytest.mark.parametrize("effect", SIZES)
 def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     given, equation = SIZES[effect]

@@ -53,7 +53,7 @@ def _angles(state: State) -> None:
         # what effects make of it is taken of a smoothed angle, whose noise is not that of the residual
         calm_low, calm_high = poles * rec.calm_before - rec.axis[j], poles * rec.calm - rec.axis[j]
         state.regressor.append(_mean_shape(state, calm_low, calm_high, shift, ramp, True) * per)
-        state.conducting.append(_conducting_shape(state, np.minimum(low, high), np.maximum(low, high), shift, ramp))
+        state.conducting.append(_conducting_shape(state, j, np.minimum(low, high), np.maximum(low, high), shift, ramp))
 
 
 def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> Dual:
@@ -79,23 +79,28 @@ def _before(x: np.ndarray) -> np.ndarray:
     return np.concatenate([x[:1], x[:-1]])
 
 
-def _conducting_shape(state: State, low, high, shift, ramp) -> Dual:
-    """Mean of f over the part of each interval in which its phase is switched on.
+def _conducting_shape(state: State, j: int, low, high, shift, ramp) -> Dual:
+    """Mean of f over the part of each interval in which phase j is switched on.
 
-    The mean of f i is the mean current times this, even where the current sets in within the interval. Switched off, it
-    flows on until the bus voltage has taken it down.
+    The mean of f i is the mean current times this, even where the current sets in within the interval. Switched off, by
+    the edge of the phase that replaces it, it flows on until the bus voltage has taken it down.
     """
     rec, motor = state.rec, state.rec.actuator
     passed = motor.pole_pairs * rec.speed * passing_time(motor, rec.level)
     flows_on = np.clip(passed, -PLATEAU, PLATEAU)
     centre = 0.5 * (low + high)
     half_turn = np.pi * np.floor(centre / np.pi)
-    first = half_turn + PLATEAU + np.minimum(flows_on, 0.0)
-    last = half_turn + np.pi - PLATEAU + np.maximum(flows_on, 0.0)
+    first = half_turn + PLATEAU - _early(state, j) + np.minimum(flows_on, 0.0)
+    last = half_turn + np.pi - PLATEAU - _early(state, (j + 1) % 3) + np.maximum(flows_on, 0.0)
     a, b = np.clip(low, first, last), np.clip(high, first, last)
     narrow = b - a < 1e-5
     b = np.where(narrow, a + 1e-5, b)
     return _mean_shape(state, a, b, shift, ramp) * (1.0 / (b - a))
+
+
+def _early(state: State, j: int) -> float:
+    """Electrical rad by which the commutations that switch phase j on come early."""
+    return float(value_of(_sum(state, "commutation", j)))
 
 
 def _coefficients(state: State) -> None:
