@@ -15,7 +15,8 @@ from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
 
-RUN = 1e-3  # s, longest run of intervals that is averaged
+RUN = 1e-3  # s, longest run of intervals that is averaged in motion
+RESTING = 5e-2  # s, at rest
 UNKNOWN = 0.2  # of the inductance's voltage, where no end currents tell of tolerance and saturation
 BESIDE = 2  # intervals in which a current may fade after its phase is switched off
 NAMES = ("electrical_a", "electrical_b", "electrical_c")
@@ -106,8 +107,7 @@ def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where runs begin among their rows, their lengths, and the rows (sample,): none around phase j's commutations, and
-    none at rest where a phase that is switched on has but the ripple of no current."""
+    """Where runs begin among their rows, their lengths, and the rows (sample,): none around phase j's commutations."""
     rec = state.rec.rows_from
     return rec.once(("runs", j), lambda: _new_runs(state, j))
 
@@ -119,10 +119,11 @@ def _new_runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     for edge in (j, (j + 1) % 3):
         for shift in (-1, 0, 1):
             known[np.clip(rows_of(state, edge) + shift, 0, rec.size - 1)] = False
-    idle = switched_on(state, j) & ~rec.moving & (np.abs(rec.current[:, j]) < rec.actuator.hysteresis)
-    rows = np.flatnonzero(known & ~idle) if np.any(known & ~idle) else np.flatnonzero(known)
-    longest = max(1, round(RUN / rec.interval))
-    fresh = np.concatenate([[True], np.diff(rows) > 1])
+    rows = np.flatnonzero(known)
+    moves = rec.moving[rows]
+    # at rest the ripple is the same again and again, and beats with short runs in a way that motion does not
+    longest = np.where(moves, max(1, round(RUN / rec.interval)), max(1, round(RESTING / rec.interval)))
+    fresh = np.concatenate([[True], (np.diff(rows) > 1) | np.diff(moves)])
     first = np.flatnonzero(fresh)
     since = np.arange(len(rows)) - first[np.cumsum(fresh) - 1]
     starts = np.flatnonzero(since % longest == 0)
