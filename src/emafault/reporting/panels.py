@@ -47,6 +47,12 @@ class Curves:
     aside: bool
     predicted: tuple[np.ndarray, np.ndarray] | None = None
 
+    def smooth(self, stage: int) -> np.ndarray:
+        """(row,) residual before (0) or after (1), of what is measured and predicted where both are smoothed."""
+        if self.predicted is None or self.measured is None:
+            return (self.before, self.after)[stage]
+        return (self.measured - self.predicted[stage]) / self.deviation
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -153,7 +159,8 @@ def _means(curves: Sequence[Curves], place: str) -> dict[str, Any]:
     at = np.minimum((STRETCHES * (x - low) / max(high - low, 1e-300)).astype(int), STRETCHES - 1)
     at = _joined(np.bincount(at, minlength=STRETCHES), max(FEWEST, len(x) * LEAST))[at]
     count = np.bincount(at)
-    columns = {"x": x, **{k: np.concatenate([getattr(c, k) for c in curves]) for k in ("before", "after")}}
+    before, after = (np.concatenate([c.smooth(k) for c in curves]) for k in (0, 1))
+    columns = {"x": x, "before": before, "after": after}
     return {k: _quantised(np.bincount(at, v)[count > 0] / count[count > 0]) for k, v in columns.items()}
 
 
