@@ -152,8 +152,8 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
     if detail is not None:
         page.heading("Measured and predicted, equation by equation")
         page.paragraph(
-            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. From top "
-            "to bottom: the residual averaged over all recordings, which shows what the noise of single samples hides; "
+            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. From "
+            "top to bottom: the residual averaged over all recordings, which shows what noise hides in single samples; "
             "measured and predicted signals; single residuals. Residuals are in standard deviations (sd) of the noise, "
             "which puts nineteen in twenty into the shaded band. Drag to zoom in, double-click to see everything."
         )
