@@ -123,7 +123,7 @@ def markup(panel: Panel, name: str) -> str:
         f'<figure class="panel" id="{html.escape(name)}"><figcaption><strong>{text}</strong>{shown}</figcaption>'
         f'<div class="controls" hidden><label>recording <select><option value="">all recordings</option>{options}'
         f"</select></label> <label>along <select>{along}</select></label> <span>{buttons}</span></div>"
-        f'<div class="charts" tabindex="0" role="img" aria-label="{text} Keys: plus, minus, arrows, 0."></div>'
+        f'<div class="charts" tabindex="0" role="group" aria-label="{text} Keys: plus, minus, arrows, 0."></div>'
         f'<script type="application/json">{packed}</script>'
         "</figure>"
     )
