@@ -105,7 +105,7 @@ def verdict() -> str:
         f"`diagnosis.json` ({schema['title'].split(', ')[-1]}), the same for the reference actuator and for measured "
         "machines. It is checked against `src/emafault/reporting/verdict.schema.json` (JSON Schema) before it is "
         "written. `[]` stands for each entry of a list, `*` for each key.\n",
-        "| field | type | accepted | always there |\n|---|---|---|---|",
+        "| field | type | accepted, or what it is | always there |\n|---|---|---|---|",
     ]
     for path, node, required in _fields(schema, schema["$defs"], ""):
         out.append(f"| `{path}` | {_type(node)} | {_accepted(node)} | {'yes' if required else ''} |")

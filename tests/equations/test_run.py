@@ -76,7 +76,7 @@ def test_the_page_has_a_chart_of_every_equation_and_every_fitted_number(written,
         "magnet temperature: alpha_m",
         "unit calibration: R_scale",
         "inertia: scale",
-        "controller: speed gain",
+        "controller: speed_gain",
     ):
         assert f">{number}</td>" in page
     falls = re.search(r"Electrical a: the residual over the noise falls from ([\d.]+) to ([\d.]+)", page)

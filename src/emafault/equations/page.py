@@ -152,9 +152,10 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
     if detail is not None:
         page.heading("Measured and predicted, equation by equation")
         page.paragraph(
-            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. "
-            "Residuals are in standard deviations; of noise alone, nineteen in twenty lie in the shaded band. Drag to "
-            "zoom in, double-click to see everything."
+            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. From "
+            "top to bottom: the residual averaged over all recordings, which shows what noise hides in single samples; "
+            "measured and predicted signals; single residuals. Residuals are in standard deviations (sd) of the noise, "
+            "which puts nineteen in twenty into the shaded band. Drag to zoom in, double-click to see everything."
         )
         page.panels(detail.panels)
     page.heading("Which: posterior probability of each set of effects")

@@ -86,8 +86,9 @@ def body(page: Page, found: Diagnosed, key: str, level: int = 3) -> None:
         page.table(["equation", "along", "most of it lies at", "size over the noise", "share"], rows)
     page.heading("Measured and predicted, equation by equation", level)
     page.paragraph(
-        "Before is the base model fitted by itself, after the leading set of effects. Residuals are in standard "
-        "deviations; of noise alone, nineteen in twenty lie in the shaded band."
+        "Before is the base model fitted by itself, after the leading set of effects. From top to bottom: the residual "
+        "averaged over all recordings, measured and predicted signals, single residuals. Residuals are in standard "
+        "deviations (sd) of the noise, which puts nineteen in twenty into the shaded band."
     )
     page.panels(panels(found), key)
     rows = [

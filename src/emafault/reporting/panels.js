@@ -94,7 +94,8 @@
         const means = { series: [
           { label: panel.along[place] }, series("mean before", "--before", true, 4), series("mean after", "--after", true, 4),
         ] };
-        charts.push(new uPlot(shared("mean, all recordings (sd)", {}, means, 190), panel.means[place], box));
+        charts.unshift(new uPlot(shared("mean residual (sd)", {}, means, 200), panel.means[place], box));
+        box.prepend(charts[0].root);
       }
     };
 

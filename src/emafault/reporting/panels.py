@@ -15,7 +15,8 @@ import numpy as np
 
 HERE = Path(__file__).parent
 MOST = 2400  # rows of an equation that a page shows, over all recordings
-STRETCHES, FEWEST = 100, 8  # of a coordinate, with as many rows each, that residuals are averaged in; fewest rows
+STRETCHES = 100  # of a coordinate, that residuals are averaged in
+FEWEST, LEAST = 3, 1 / 400  # rows, and share of them, that each has, or it is joined with the next
 STEPS = 65534  # of a quantised signal; the number beyond is a missing one
 BUTTONS = (("in", "zoom in", "+"), ("out", "zoom out", "−"), ("left", "move left", "←"), ("right", "move right", "→"),
            ("reset", "show everything", "all"))  # fmt: skip
@@ -45,6 +46,12 @@ class Curves:
     squares: tuple[float, float]
     aside: bool
     predicted: tuple[np.ndarray, np.ndarray] | None = None
+
+    def smooth(self, stage: int) -> np.ndarray:
+        """(row,) residual before (0) or after (1), of what is measured and predicted where both are smoothed."""
+        if self.predicted is None or self.measured is None:
+            return (self.before, self.after)[stage]
+        return (self.measured - self.predicted[stage]) / self.deviation
 
 
 @dataclass(frozen=True)
@@ -116,7 +123,7 @@ def markup(panel: Panel, name: str) -> str:
         f'<figure class="panel" id="{html.escape(name)}"><figcaption><strong>{text}</strong>{shown}</figcaption>'
         f'<div class="controls" hidden><label>recording <select><option value="">all recordings</option>{options}'
         f"</select></label> <label>along <select>{along}</select></label> <span>{buttons}</span></div>"
-        f'<div class="charts" tabindex="0" role="img" aria-label="{text} Keys: plus, minus, arrows, 0."></div>'
+        f'<div class="charts" tabindex="0" role="group" aria-label="{text} Keys: plus, minus, arrows, 0."></div>'
         f'<script type="application/json">{packed}</script>'
         "</figure>"
     )
@@ -148,12 +155,23 @@ def _misfits(curves: Sequence[Curves]) -> tuple[float, float]:
 def _means(curves: Sequence[Curves], place: str) -> dict[str, Any]:
     """Means of all rows' residuals in stretches of a coordinate, which show what the noise of single rows hides."""
     x = np.concatenate([c.along[place] for c in curves])
-    shares = np.linspace(0.0, 1.0, int(np.clip(len(x) // FEWEST, 8, STRETCHES)) + 1)
-    edges = np.unique(np.quantile(x, shares)) if len(x) else np.zeros(0)
-    at = np.searchsorted(edges[1:-1], x, "right")
+    low, high = (np.min(x), np.max(x)) if len(x) else (0.0, 0.0)
+    at = np.minimum((STRETCHES * (x - low) / max(high - low, 1e-300)).astype(int), STRETCHES - 1)
+    at = _joined(np.bincount(at, minlength=STRETCHES), max(FEWEST, len(x) * LEAST))[at]
     count = np.bincount(at)
-    columns = {"x": x, **{k: np.concatenate([getattr(c, k) for c in curves]) for k in ("before", "after")}}
+    before, after = (np.concatenate([c.smooth(k) for c in curves]) for k in (0, 1))
+    columns = {"x": x, "before": before, "after": after}
     return {k: _quantised(np.bincount(at, v)[count > 0] / count[count > 0]) for k, v in columns.items()}
+
+
+def _joined(count: np.ndarray, least: float) -> np.ndarray:
+    """(stretch,) number of the group that each belongs to, neighbours joined until a group has enough rows."""
+    out, group, rows = np.zeros(len(count), int), 0, 0
+    for k, more in enumerate(count):
+        if rows >= least:
+            group, rows = group + 1, 0
+        out[k], rows = group, rows + more
+    return out
 
 
 def _packed(curves: Curves, share: float) -> dict[str, Any]:
