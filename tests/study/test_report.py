@@ -7,13 +7,14 @@ import pytest
 from emafault.study.report import compare_variants
 
 
-def _metrics(path, closed_form, network, bound):
+def _metrics(path, closed_form, network, bound, of="floating"):
     outputs = ("N", "xi", "dT")
     results = [
         {"method": "weighted", "estimator": estimator, "all": {f"errors.{o}.mae": {"mean": error} for o in outputs}}
+        | {"bound": of}
         for estimator, error in (("closed_form", closed_form), ("network", network))
     ]
-    bounds = {"floating": dict.fromkeys(outputs, bound)}
+    bounds = {"floating": dict.fromkeys(outputs, 2.0 * bound)} | {of: dict.fromkeys(outputs, bound)}
     path.write_text(json.dumps({"results": results, "level": 0.9, "bound": bounds}))
     return str(path)
 
@@ -34,3 +35,9 @@ def test_the_best_variant_is_named(tmp_path, bounds, says):
     text = (tmp_path / "report.html").read_text()
     assert says in text
     assert not same or "the first within 5 % of it is runs 2, 0.20500" in text
+
+
+def test_nine_features_stand_beside_the_bound_of_the_recordings(tmp_path):
+    files = [_metrics(tmp_path / f"{n}.json", b, b, b, "recording") for n, b in enumerate((0.3, 0.1))]
+    compare_variants("study", "Which?", ["ramp", "sine"], files, tmp_path / "report.html", tmp_path / "figures")
+    assert "the bound is lowest for sine, 0.10000" in (tmp_path / "report.html").read_text()
