@@ -64,7 +64,7 @@ def test_a_verdict_is_printed_though_it_cannot_be_written(machine):
     with full_disk():
         said = diagnose()
     assert said.code == 2 and "Constant drop" in said.printed
-    assert len(said.lines) == 1 and "out/diagnosis.json: cannot be written" in said.lines[0]
+    assert len(said.lines) == 1 and "out/report.html: cannot be written" in said.lines[0]
     assert not list((machine / "out").glob("*"))
 
 

@@ -120,9 +120,9 @@ def _note(question: str, best: Mapping[str, Any], values: Mapping[str, float]) -
     return "\n".join([question, "", *lines, "", f"Its intervals cover {values['coverage']:.3f}."])
 
 
-def _network(path: str, history: str, table: Mapping[str, Any]) -> Network:
-    """The exported network with its own errors."""
-    method, estimator = Path(history).parts[-3:-1]
+def _network(path: str, folder: str, table: Mapping[str, Any]) -> Network:
+    """The exported network with its own errors; ``folder`` of its estimator."""
+    method, estimator = Path(folder).parts[-2:]
     own = next(e["all"] for e in table["results"] if (e["method"], e["estimator"]) == (method, estimator))
     return Network(path, {"reconstruction": method, "estimator": estimator}, _errors("network", own))
 
