@@ -121,6 +121,14 @@ def test_a_current_that_flows_on_makes_torque():
     assert abs(x @ left) / np.sqrt(x @ x) < 3.0
 
 
+def test_a_supply_that_sags_gives_the_same_power_by_more_current():
+    given = {"bus_resistance": {"R": 0.4}}
+    recording = recorded("step", interval=1e-4, effects=given)
+    machine = machine_of({"a.nc": recording})
+    assert recording.bus_voltage.min() < 43.0
+    assert mean_squares(machine, truth(machine, recording, given))["bus"] < 1.3
+
+
 def test_beyond_its_plateau_a_phase_makes_less_torque():
     given = {"hall_displacement": {"d_a": -4.6, "d_b": -4.6, "d_c": -0.3}}
     recording = recorded("reversal", effects=given)

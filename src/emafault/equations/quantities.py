@@ -147,4 +147,4 @@ def _resistances(state: State) -> None:
     ]
     state.loss = loss
     drive = sum((value_of(state.k[j]) * value_of(state.swept[j]) * value_of(state.current[j]) for j in range(3)), 0.0)
-    state.bus_current = (loss + drive) / a.bus_voltage
+    state.bus_current = (loss + drive) / (a.bus_voltage if rec.bus is None else rec.bus)
