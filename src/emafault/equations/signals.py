@@ -154,7 +154,8 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     """Noise of the channels that regressors are made of, from differences in which the motion hardly shows; what every
     recording states is taken as it says.
 
-    The angle's is taken of the most finely sampled recordings, that of the end currents where a phase floats.
+    The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
+    each of them has.
     """
 
     def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
@@ -171,19 +172,12 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     fine = [r for r in recordings if r.interval < 1.5 * finest]
     angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
     current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
-    ends: list[np.ndarray] = []
     step = max(lattice_step(r.phase_current[:, 0]) for r in recordings)
-    for r in recordings:
-        for j in range(3):
-            off = np.abs(r.phase_current[:, j]) < 4.0 * current
-            still = off & np.roll(off, 1) & np.roll(off, -1)
-            if r.phase_current_end is not None and still.sum() > 20:
-                x = r.phase_current_end[:, j] - r.phase_current_end.mean(axis=1)
-                ends.append(x[still] - np.median(x[still]))
+    ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in recordings if r.phase_current_end is not None]
     output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
     speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
     limits = {
-        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(2.0 / 3.0), "position": output,
+        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(18.0), "position": output,
     }  # fmt: skip
     if lattice_step(fine[0].rotor_speed) == 0.0:
         limits["speed"] = speed
