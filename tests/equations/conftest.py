@@ -32,11 +32,13 @@ def recorded(
     interval=2e-4,
     theta_0=0.7,
     health="healthy",
+    noise=NOISE,
+    settings=None,
 ):
     """A recording of a unit with these effects and faults."""
     runs = make_runs(actuator, np.array([fault]), effects=effects or {}, theta_0=theta_0)
-    position = command_positions(command, (COMMANDS | STEP)[command], 0.8, actuator.control_period)
-    out = measure(simulate(runs, position, 0.8, interval), runs, NOISE, seed)
+    position = command_positions(command, settings or (COMMANDS | STEP)[command], 0.8, actuator.control_period)
+    out = measure(simulate(runs, position, 0.8, interval), runs, noise, seed)
     ambient = float(out.pop("ambient_temperature")[0])
     return Recording(
         time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": health, "command": command},

@@ -35,7 +35,9 @@ def residual(state: State) -> Dual:
     shaft = position.shaft_angle(state)
     output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
     model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
-    seen = model + _averaged(rec.speed_recorded - model, h)
+    beyond = _averaged(rec.speed_recorded - model, h)
+    # rounding is the recording's alone, and no more than a step
+    seen = model + np.sign(beyond) * np.maximum(np.abs(beyond) - rec.speed_step, 0.0)
     commanded = rec.once(("commanded",), lambda: _commanded(rec, lead))
     at_ticks = output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
     wanted = p("controller.position_gain") * (a.gear_ratio * (commanded - at_ticks))
@@ -52,7 +54,7 @@ def residual(state: State) -> Dual:
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    flowing = _calmed((rec.level - _beyond(state)) * sign, h) / gain
+    flowing = _calmed((_true_level(state) - _beyond(state)) * sign + _sensors_show(state), h) / gain
     # the current changes as the demand does, and is known with less noise
     asked_for = asked_for - late * np.gradient(np.asarray(value_of(flowing)), h)
     width = block_length(rec)
@@ -66,6 +68,23 @@ def _calmed(x: np.ndarray, h: float) -> np.ndarray:
 
 def _averaged(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(AVERAGED / h), mode="nearest")
+
+
+def _true_level(state: State) -> np.ndarray:
+    """(sample,) half the sum of the absolute phase currents (A)."""
+    return 0.5 * np.sum([np.abs(np.asarray(value_of(i))) for i in state.current], axis=0)
+
+
+def _sensors_show(state: State) -> np.ndarray:
+    """(sample,) what the regulator sees of the pair's current beyond the true one (A): the mean of what the sensors of
+    the two phases that are switched on show, each in the direction in which the pair's current is counted."""
+    rec = state.rec
+    out = np.zeros(rec.size)
+    for j in range(3):
+        f = np.sin(rec.actuator.pole_pairs * rec.middle - rec.axis[j])
+        on = np.where(np.abs(f) > np.sin(commutation.EDGE), np.sign(f), 0.0)
+        out += 0.5 * on * (rec.current[:, j] - np.asarray(value_of(state.current[j])))
+    return out
 
 
 def _beyond(state: State) -> np.ndarray:
@@ -99,7 +118,12 @@ def _supply(rec, sign: np.ndarray) -> np.ndarray:
     """(sample,) voltage of the supply, the back-EMF of two phases added where it goes with ``sign`` (V)."""
     a = rec.actuator
     back_emf = 2.0 * a.back_emf * np.abs(rec.speed) * sign * np.sign(rec.speed)
-    return np.maximum(a.bus_voltage + back_emf, HEADROOM * a.bus_voltage)
+    return np.maximum(_bus(rec) + back_emf, HEADROOM * a.bus_voltage)
+
+
+def _bus(rec) -> np.ndarray | float:
+    """Voltage of the supply, the nominal one where none is recorded (V)."""
+    return rec.actuator.bus_voltage if rec.bus is None else rec.bus
 
 
 def _at_limit(rec) -> np.ndarray:
@@ -111,7 +135,7 @@ def _without_headroom(rec) -> np.ndarray:
     """(sample,) where back-EMF and resistance leave the supply too little to drive the current that is asked for."""
     a = rec.actuator
     needed = 2.0 * a.back_emf * np.abs(rec.speed) + a.resistance * (2.0 * rec.level)
-    return needed > (1.0 - HEADROOM) * a.bus_voltage
+    return needed > (1.0 - HEADROOM) * _bus(rec)
 
 
 def block_length(rec) -> int:
@@ -158,8 +182,8 @@ def late(state: State) -> np.ndarray:
 
 
 def usable(state: State) -> np.ndarray:
-    """(block,) where the rotor turns, no limit may be reached at random, nothing is cut off and no average looks
-    beyond the record."""
+    """(block,) where the rotor turns and the mean currents tell the pair's, no limit may be reached at random, nothing
+    is cut off and no average looks beyond the record."""
     rec = state.rec
     return rec.once(("control.usable",), lambda: _usable(rec, np.sign(state.drive)))
 
@@ -168,7 +192,7 @@ def _usable(rec, sign: np.ndarray) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    limited = _at_limit(rec) | _without_headroom(rec) | rec.lost
+    limited = _at_limit(rec) | _without_headroom(rec) | rec.lost | ~rec.resolved
     limited = binary_dilation(limited, iterations=odd(SPEED_SPAN / rec.interval))
     free = ~limited[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean

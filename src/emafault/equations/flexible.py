@@ -1,4 +1,4 @@
-"""The user shaft behind a stiffness, driven through its play by a given motion of the gear."""
+"""The user shaft driven through its play by a given motion of the gear, rigidly or behind a stiffness."""
 
 import numpy as np
 
@@ -29,7 +29,8 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
             g = start + s * (slope + s * (bend + s * turn))
             rate = (slope + s * (2.0 * bend + 3.0 * s * turn)) / interval
             gap = g - x
-            side = 1.0 if gap > 0.5 * play else (-1.0 if gap < -0.5 * play else 0.0)
+            at = gap - 0.5 * h * v  # in the middle of the step, as g is
+            side = 1.0 if at > 0.5 * play else (-1.0 if at < -0.5 * play else 0.0)
             stiffness, damping = (K, C) if side != 0.0 else (0.0, 0.0)
             # implicit midpoint rule: second order, and stable however fast the damping is
             twist = gap - 0.5 * side * play
@@ -44,3 +45,17 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
         start, slope = gear[m], end
         position[m], torque[m] = x, total / steps
     return position, torque
+
+
+@compiled
+def through_play(gear, half):
+    """Angle of the shaft behind a play of half-width ``half`` (rad), and its derivative by ``half``."""
+    out, slope = np.empty(gear.shape[0]), np.empty(gear.shape[0])
+    at, by = 0.0, 0.0
+    for n in range(gear.shape[0]):
+        if gear[n] - half > at:
+            at, by = gear[n] - half, -1.0
+        elif gear[n] + half < at:
+            at, by = gear[n] + half, 1.0
+        out[n], slope[n] = at, by
+    return out, slope

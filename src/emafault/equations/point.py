@@ -85,5 +85,5 @@ class State:
         for name in ("current", "k", "conducting"):
             setattr(out, name, [Dual(x.value) for x in getattr(self, name)])
         out.rec = copy(self.rec)
-        out.rec.inertia_scale = Dual(self.rec.inertia_scale.value)
+        out.rec.inertia_scale, out.rec.play = Dual(self.rec.inertia_scale.value), Dual(self.rec.play.value)
         return out

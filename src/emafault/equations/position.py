@@ -2,37 +2,20 @@
 
 import numpy as np
 
-from ..compiled import compiled
 from .acquisition import recorded_late
 from .dual import Dual, value_of
+from .flexible import through_play
 from .point import State, effect_name
 from .terms import with_hook
-
-
-@compiled
-def through_play(gear, half):
-    """Angle of the shaft behind a play of half-width ``half`` (rad), and its derivative by ``half``."""
-    out, slope = np.empty(gear.shape[0]), np.empty(gear.shape[0])
-    at, by = 0.0, 0.0
-    for n in range(gear.shape[0]):
-        if gear[n] - half > at:
-            at, by = gear[n] - half, -1.0
-        elif gear[n] + half < at:
-            at, by = gear[n] + half, 1.0
-        out[n], slope[n] = at, by
-    return out, slope
 
 
 def shaft_angle(state: State) -> Dual:
     """Angle of the user shaft behind the gear's play and flexibility (rad)."""
     rec = state.rec
-    play = Dual(0.0)
-    for m in with_hook("play"):
-        play = play + m.play(state.p.of(effect_name(m)))
-    value, slope = through_play(rec.turned / rec.actuator.gear_ratio, 0.5 * float(value_of(play)))
-    shaft = play.through(value, 0.5 * slope)
+    value, slope = through_play(rec.turned / rec.actuator.gear_ratio, 0.5 * float(value_of(rec.play)))
+    shaft = rec.play.through(value, 0.5 * slope)
     for m in with_hook("twist"):
-        shaft = m.twist(state.p.of(effect_name(m)), rec, shaft, float(value_of(play)))
+        shaft = m.twist(state.p.of(effect_name(m)), rec, shaft)
     return shaft
 
 

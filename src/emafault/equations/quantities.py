@@ -20,6 +20,7 @@ def fill(state: State) -> None:
     rec.dT = state.dT
     scale = _product(state, "inertia")
     rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
+    rec.play = _sum(state, "play")
     state.current, state.current_end = true_currents(rec, p)
     _angles(state)
     _coefficients(state)
@@ -136,9 +137,10 @@ def _resistances(state: State) -> None:
     loss = np.zeros(rec.size)
     warm = 1.0 + alpha * rec.dT_measured
     for j in range(3):
-        i = np.asarray(value_of(state.current[j]))
-        on = np.abs(i) > 0.5 * a.hysteresis
-        loss = loss + float(value_of(base[j])) * warm * (i * i + on * ripple)
+        i = np.abs(np.asarray(value_of(state.current[j])))
+        on = i > 0.5 * a.hysteresis
+        # a phase that is on for a part of an interval carries the pair's current there
+        loss = loss + float(value_of(base[j])) * warm * (i * np.maximum(i, rec.level) + on * ripple)
     heat = 0.0
     for m in with_hook("heating"):
         heat = heat + m.heating(p.of(effect_name(m)), rec, loss)
@@ -146,5 +148,13 @@ def _resistances(state: State) -> None:
         base[j] * (1.0 + alpha * (state.dT + heat)) + _sum(state, "resistance", rec, j) for j in range(3)
     ]
     state.loss = loss
-    drive = sum((value_of(state.k[j]) * value_of(state.swept[j]) * value_of(state.current[j]) for j in range(3)), 0.0)
-    state.bus_current = (loss + drive) / (a.bus_voltage if rec.bus is None else rec.bus)
+    drive = sum(
+        (value_of(state.k[j]) * value_of(state.conducting[j]) * value_of(state.current[j]) for j in range(3)), 0.0
+    )
+    state.bus_current = (loss + drive * rec.rate + _stored(state)) / (a.bus_voltage if rec.bus is None else rec.bus)
+
+
+def _stored(state: State) -> np.ndarray:
+    """(sample,) power that the fields of the windings take up (W)."""
+    energy = 0.5 * state.rec.actuator.inductance * sum(np.asarray(value_of(i)) ** 2 for i in state.current_end)
+    return np.diff(energy, prepend=0.0) / state.rec.interval

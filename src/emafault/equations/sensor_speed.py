@@ -34,7 +34,20 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((rad/s)2)."""
     rec = state.rec
     angle = (rec.noise.angle / rec.interval) ** 2
+    rounded = (0.5 * rec.speed_step) ** 2  # next to a change
     return [
-        np.full(rec.size, rec.noise.speed**2 + rec.speed_step**2 / 12.0 + 2.0 * angle),
+        np.full(rec.size, rec.noise.speed**2 + rounded + 2.0 * angle),
         np.full(rec.size - 1, -angle),
     ]
+
+
+def usable(state: State) -> np.ndarray:
+    """(sample,) all but the first and last, where the speed lies on a lattice those next to a change: in between, what
+    rounding leaves is the same again and again, and on both sides of a change together it is nothing."""
+    rec = state.rec
+    changes = np.diff(rec.speed_recorded) != 0.0
+    out = np.ones(rec.size, bool)
+    if rec.speed_step > 0.0:
+        out[1:-1] = changes[1:] | changes[:-1]
+    out[0] = out[-1] = False
+    return out

@@ -75,6 +75,9 @@ class Signals:
         # dry friction is known where the rotor moves throughout
         self.moving = moving & np.roll(moving, 1) & np.roll(moving, -1)
         self.moving[0] = False
+        # between its two directions a phase rests for a sixth of an electrical turn; its mean current over an interval
+        # that may hold more is no measure of torque or power
+        self.resolved = np.abs(self.half_sweep) * self.actuator.pole_pairs < np.pi / 6.0
         self.start = self._start_angle()
         self.turned = theta - self.start
         self.shaft = 0.5 * (theta + self.before - 2.0 * self.start) / self.actuator.gear_ratio
@@ -86,13 +89,13 @@ class Signals:
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
         self.speed_step = lattice_step(self.speed_recorded)
         self.current_step = max(lattice_step(x) for x in self.current.T)
-        self.nominal_play = self.actuator.backlash
         self.dT_measured = self.ambient - self.actuator.reference_temperature
         self.solved: dict[tuple, Any] = {}
         self._once: dict[tuple, Any] = {}
         # with their derivatives once a point is known
         self.dT: Any = self.dT_measured
         self.inertia_scale: Any = Dual(1.0)
+        self.play: Any = Dual(self.actuator.backlash)
 
     def _start_angle(self) -> float:
         moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)

@@ -59,9 +59,9 @@ def two_intervals(x: np.ndarray) -> np.ndarray:
 
 
 def usable(state: State) -> np.ndarray:
-    """(sample,) where the rotor moves throughout."""
-    moving = state.rec.moving
-    out = moving & np.roll(moving, -1)
+    """(sample,) where the rotor moves throughout, and the mean currents tell the torque."""
+    known = state.rec.moving & state.rec.resolved
+    out = known & np.roll(known, -1)
     out[:2] = out[-2:] = False
     return out
 

@@ -14,4 +14,6 @@ def sag(p, rec, current):
     if not (R.value or R.slopes):
         return R
     decay = np.exp(-rec.interval / FILTER)
-    return R * followed(current, 1.0 - decay, decay)
+    at_end = followed(current, 1.0 - decay, decay)
+    before = np.concatenate([[0.0], at_end[:-1]])
+    return R * (current + (before - current) * ((1.0 - decay) * FILTER / rec.interval))  # mean over each interval

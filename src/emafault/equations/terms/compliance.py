@@ -40,27 +40,28 @@ def rotor_share(p, rec):
     return 1.0 - SHARE if p("flexibility").value >= _stiffest(rec) else 1.0
 
 
-def twist(p, rec, rigid, play):
+def twist(p, rec, rigid):
     """User angle (rad) that replaces the rigid one."""
-    return _dual(p, rec, 0, rigid, play)
+    return _dual(p, rec, 0, rigid)
 
 
 def torque(p, rec):
     """Torque of the shaft on the motor (N m)."""
-    return _dual(p, rec, 1, None, rec.nominal_play)
+    return _dual(p, rec, 1, None)
 
 
-def _dual(p, rec, which, rigid, play):
-    flexibility, damping, inertia = p("flexibility"), p("C"), rec.inertia_scale
-    given = flexibility.value, damping.value, play, inertia.value
+def _dual(p, rec, which, rigid):
+    parameters = p("flexibility"), p("C"), rec.play, rec.inertia_scale
+    given = tuple(float(x.value) for x in parameters)
+    flexibility = parameters[0]
     base = _solved(rec, *given)
     if base is None:
         return rigid if rigid is not None else flexibility.through(0.0, 0.0)
     out = flexibility.through(np.asarray(base[which]), 0.0)
     own = rec.actuator
-    steps = 1e-6 * scale(SCALES["flexibility"], own), 5.0 * scale(SCALES["C"], own), 0.01
-    for parameter, m, step in zip((flexibility, damping, inertia), (0, 1, 3), steps, strict=True):
-        if parameter.slopes:
+    steps = 1e-6 * scale(SCALES["flexibility"], own), 5.0 * scale(SCALES["C"], own), 0.02 * own.backlash, 0.01
+    for m, (parameter, step) in enumerate(zip(parameters, steps, strict=True)):
+        if parameter.slopes and step > 0.0:
             there = _solved(rec, *(x + step if k == m else x for k, x in enumerate(given)))
             out = out + parameter.through(0.0, (there[which] - base[which]) / step)
     return out

@@ -1,0 +1,44 @@
+"""Nearly without noise nothing is left at the simulated point along any coordinate: what noise hides in one recording
+a bench of many would find."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from emafault.actuator.sensors import SensorNoise
+from emafault.diagnosis.whitening import whiten
+
+from .conftest import NOISE, machine_of, recorded
+from .test_residuals import truth
+
+QUIET = SensorNoise(**{channel: 0.05 * size for channel, size in asdict(NOISE).items()})
+FLEXIBLE = {"compliance": {"K": 2e4, "C": 350.0}}
+ROUNDED = {"speed_quantisation": {"step": 5.0}}
+OFFSETS = {"current_offset": {"o_a": -0.03, "o_b": -0.02, "o_c": -0.05}}
+SPRING = {"load_spring": {"c": 150.0}}
+CASES = {
+    "what a phase that is off shows is not regulated": ("control", "parabolic", 2e-4, OFFSETS),
+    "torque, phases on in both directions": ("torque", "step", 1e-3, {}),
+    "rounding is the recording's alone": ("control", "parabolic", 2e-4, ROUNDED),
+    "rounding, the same for long": ("sensor_speed", "parabolic", 2e-4, ROUNDED),
+    "a supply of another voltage": ("control", "step", 2e-4, {"bus_voltage": {"Vdc": 44.0}}),
+    "fields take up power": ("bus", "step", 2e-4, {"bus_resistance": {"R": 0.5}}),
+    "contact while the shaft moves": ("torque", "sine", 5e-5, FLEXIBLE),
+    "flexible behind this unit's play": ("torque", "sine", 5e-5, FLEXIBLE | {"backlash": {"blk": 4e-4}}),
+    "a spring behind this unit's play": ("torque", "sine", 1e-4, SPRING | {"backlash": {"blk": 9e-4}}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_nothing_is_left_along_any_coordinate(case):
+    equation, command, interval, effects = CASES[case]
+    leap = {"amplitude": 0.08, "time": 0.02} if command == "step" else None
+    recording = recorded(command, effects=effects, interval=interval, noise=QUIET, settings=leap)
+    machine = machine_of({"a.nc": recording})
+    values = {n: v for n, v in truth(machine, recording, effects).items() if n in machine.parameters}
+    block = next(b for b in machine.blocks(values, "a.nc") if b.equation == equation)
+    rows = np.column_stack([block.residual, *block.coordinates["phi"]])
+    left, *along = whiten(block.bands, block.usable, rows)[block.usable].T
+    assert block.usable.sum() > 15
+    assert max(abs(left @ f) / np.sqrt(f @ f) for f in along if f @ f > 0.0) < 4.0
