@@ -1,12 +1,13 @@
 """Nearly without noise nothing is left at the simulated point along any coordinate: what noise hides in one recording
 a bench of many would find."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
+from emafault.diagnosis.described import Described, with_forms
 from emafault.diagnosis.whitening import whiten
 
 from .conftest import NOISE, machine_of, recorded
@@ -42,3 +43,41 @@ def test_nothing_is_left_along_any_coordinate(case):
     left, *along = whiten(block.bands, block.usable, rows)[block.usable].T
     assert block.usable.sum() > 15
     assert max(abs(left @ f) / np.sqrt(f @ f) for f in along if f @ f > 0.0) < 4.0
+
+
+def test_noise_about_a_standstill_does_not_drive_what_is_behind_a_play():
+    leap = {"amplitude": 0.046, "time": 0.05}
+    noisy, exact = (
+        machine_of({"a.nc": recorded("step", interval=5e-5, settings=leap, noise=noise)}).recordings["a.nc"]
+        for noise in (NOISE, SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0)))
+    )
+    stands = np.abs(np.gradient(exact.angle, exact.interval)) < 1e-3
+    within = slice(12000, 15500)  # long after the step
+    assert stands[within].all()
+    off = (noisy.quiet() - exact.turned)[within]
+    assert np.std(off) < 0.1 * NOISE.angle < 0.2 * np.std((noisy.turned - exact.turned)[within])
+    moves = np.abs(noisy.speed) > 20.0
+    assert moves.sum() > 1000 and np.array_equal(noisy.quiet()[moves], noisy.turned[moves])
+
+
+def test_a_large_wave_of_the_recorded_angle_is_undone_in_every_equation():
+    recording = recorded("sine", interval=1e-4)
+    size = 80.0 * NOISE.angle
+    wrong = replace(recording, rotor_angle=recording.rotor_angle + size * np.sin(recording.rotor_angle))
+    form = Described("~o", "order", "sensor_angle", 0, (("order", 1.0, 0.0, "1"),), 1.0, 1.0, "position", "angle")
+    machine = with_forms(machine_of({"a.nc": wrong}), [form])
+    here = truth(machine, recording) | {"form.~o.sine": size}
+    at, up, down = (
+        {b.equation: b for b in machine.blocks(here | {"form.~o.sine": size + step}, "a.nc")}
+        for step in (0, 2e-6, -2e-6)
+    )
+    off = {b.equation: b for b in machine.blocks(truth(machine, recording), "a.nc")}
+    for equation in ("electrical_a", "torque", "position", "commutation"):
+        block = at[equation]
+        changes = (up[equation].residual - down[equation].residual) / 4e-6
+        a, b, left, before = whiten(
+            block.bands, block.usable,
+            np.column_stack([block.columns["form.~o.sine"], changes, block.residual, off[equation].residual]),
+        ).T  # fmt: skip
+        assert left @ left < 0.7 * (before @ before), equation
+        assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.95, equation

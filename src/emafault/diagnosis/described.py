@@ -85,7 +85,9 @@ class WithForms:
         self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
     ) -> list[Block]:
         """See the machine: its blocks, with the forms' columns and what their present coefficients take out."""
-        blocks = self.machine.blocks(values, name, disturbed=disturbed, wanted=wanted)
+        less = self._undone(values, name)
+        more = {"less": less} if less else {}
+        blocks = self.machine.blocks(values, name, disturbed=disturbed, wanted=wanted, **more)
         for block in blocks:
             for form in self.forms:
                 if not form.channel and form.equation != block.equation:
@@ -97,12 +99,23 @@ class WithForms:
                 columns = self.columns(form, block)
                 if columns is None and (form.channel, block.equation) in self.machine.moving:
                     x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
-                    columns = self.machine.seen_at(values, block.recording, x)
+                    columns = self.machine.seen_at(values, block.recording, x, less)
                 if columns is None or not columns.any():
                     continue
-                block.residual = block.residual + here @ columns
+                if form.channel not in less:
+                    block.residual = block.residual + here @ columns
                 block.columns |= dict(zip(names, columns, strict=True))
         return blocks
+
+    def _undone(self, values: Mapping[str, float], recording: str) -> dict[str, np.ndarray]:
+        """By channel that equations are not linear in, what the forms' present coefficients say is wrong of it."""
+        out: dict[str, np.ndarray] = {}
+        for form in self.forms:
+            here = np.array([values.get(n, 0.0) for n in form.names(recording)])
+            if here.any() and form.channel in getattr(self.machine, "bending", ()):
+                x = here @ FORMS[form.word].columns(self.machine.sampled(recording), form.values)
+                out[form.channel] = out.get(form.channel, 0.0) + x
+        return out
 
     def columns(self, form: Described, block: Block) -> np.ndarray | None:
         """(column, row) of a form in a block; None where it does not act there."""

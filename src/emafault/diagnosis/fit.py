@@ -301,14 +301,13 @@ class Bench(NormalEquations):
         """
         ahead = np.inf  # log evidence that the last step promised
         if normal is not None:
-            on = set(self.on)
+            begun = dict(self.point), set(self.on)
             ahead = self.move(model, normal)[1]
             if ahead < self.settled:
                 return model
-            if any(u.on is not None and len(u.variants) > 1 and u.id in self.on - on for u in self.units):
-                # a secant points the way only: its effect finds its place before anything undescribed takes it
-                kept = tuple(c for c in model.choices if self._kind(c.unit) not in ("form", "remainder"))
-                return self.settle(Model(kept, 0.0, 0.0, {}, {}))
+            new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun[1]}
+            if new:
+                return self._settle_secants(model, new, begun)
         for _ in range(steps):
             if ahead < FAR:
                 break
@@ -319,6 +318,25 @@ class Bench(NormalEquations):
             found, at_point = self._fitted(model)
             if self.move(found, at_point)[1] < self.settled:
                 break
+        return found
+
+    def _settle_secants(self, model: Model, new: set[str], begun: tuple[dict[str, float], set[str]]) -> Model:
+        """A set of which units have just been switched on, at its own optimum, or without them where it was ``begun``,
+        if that is better.
+
+        A secant points the way only: its effect finds its place before anything undescribed takes it, or finds none.
+        """
+        kept = [c for c in model.choices if self._kind(c.unit) not in ("form", "remainder")]
+        found = self.settle(Model(tuple(kept), 0.0, 0.0, {}, {}))
+        if found.log_posterior >= model.log_posterior:
+            return found
+        there = dict(self.point), set(self.on)
+        self.point, self.on = begun
+        less = self.settle(Model(tuple(c for c in kept if c.unit not in new), 0.0, 0.0, {}, {}))
+        if less.log_posterior > found.log_posterior:
+            self.closer |= dict.fromkeys(new, found.log_posterior - less.log_posterior)
+            return less
+        self.point, self.on = there
         return found
 
     def inserted(self, model: Model, normal: Normal) -> Inserted:

@@ -62,6 +62,7 @@ class ReferenceActuator:
 
     name = "actuator"
     moving = (("angle", "commutation"),)  # channel and equation, what shows of one in the other depends on the point
+    bending = ("angle",)  # channels that equations are not linear in
 
     def __init__(
         self,
@@ -230,11 +231,17 @@ class ReferenceActuator:
         return self.recordings[name].size
 
     def blocks(
-        self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
+        self,
+        values: Mapping[str, float],
+        name: str,
+        disturbed: bool = False,
+        wanted: Collection[str] | None = None,
+        less: Mapping[str, np.ndarray] | None = None,
     ) -> list[Block]:
         """Residuals of every equation of a recording, with columns by every parameter, or by those ``wanted``.
 
-        ``disturbed`` takes the recording with one more draw of the sensors' noise.
+        ``disturbed`` takes the recording with one more draw of the sensors' noise; ``less`` is what a channel has too
+        much, (sample,).
         """
         rec = self.recordings[name]
         if disturbed:
@@ -243,7 +250,7 @@ class ReferenceActuator:
                     self._disturbed.clear()
                 self._disturbed[name] = rec.disturbed(1)
             rec = self._disturbed[name]
-        return self._recording(values, rec, wanted)
+        return self._recording(values, _less(rec, less or {}), wanted)
 
     # ---- the measuring chain
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
@@ -278,11 +285,13 @@ class ReferenceActuator:
                 found[b.equation].append((at.residual - b.residual) / step)
         return {e: np.array(rows) for e, rows in found.items() if (place, e) not in self.moving}
 
-    def seen_at(self, values: Mapping[str, float], name: str, x: np.ndarray) -> np.ndarray:
+    def seen_at(
+        self, values: Mapping[str, float], name: str, x: np.ndarray, less: Mapping[str, np.ndarray]
+    ) -> np.ndarray:
         """(column, row) what signals x (column, sample) on the angle's channel take out of the commutations' residuals;
-        it depends on the point, on where within an interval an edge lies."""
+        it depends on the point, on where within an interval an edge lies. ``less`` as in ``blocks``."""
         edges = [f"controller.edge_{j}@{name}" for j in PER_PHASE]
-        state = State(self.recordings[name], Point(values, name, edges))
+        state = State(_less(self.recordings[name], less), Point(values, name, edges))
         slopes = commutation.residual(state).slopes
         rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
         moved = sum((np.asarray(slopes[e]) for e in edges if e in slopes), np.zeros(len(rows)))
@@ -472,6 +481,13 @@ def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 def _acts(unit: Unit, equation: str) -> bool:
     return equation in unit.equations or (unit.id == "compliance" and equation == "torque")
+
+
+def _less(rec: Signals, less: Mapping[str, np.ndarray]) -> Signals:
+    """A recording without what its channels have too much."""
+    for channel, x in less.items():
+        rec = rec.less(channel, x)
+    return rec
 
 
 def _not_first(rec: Signals) -> np.ndarray:

@@ -17,6 +17,8 @@ from .dual import Dual
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
 UNRESOLVED = 0.2  # of the change from interval to interval: where within one a signal changes is not recorded
 SLOW = 2.0  # rad/s, below which dry friction has no known sign
+STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands still does not change
+AVERAGED_AT_REST = 2e-2  # s
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
 
@@ -102,6 +104,22 @@ class Signals:
         still = int(moved[0]) if len(moved) else self.size
         return float(np.mean(self.angle[: max(1, still - 1)]))
 
+    def quiet(self) -> np.ndarray:
+        """Angle turned from the start (rad), (sample,), averaged where the rotor stands still for long.
+
+        What a play passes on of noise about a standstill would push a shaft behind it.
+        """
+        h = self.interval
+        n = max(1, round(STANDS / h))
+        there = np.pad(self.calm, n, mode="edge")
+        known = 4.0 * self.noise.angle * np.sqrt(2.0 / odd(SPEED_SPAN / h))
+        still = np.abs(there[2 * n :] - there[: -2 * n]) < known
+        long = odd(AVERAGED_AT_REST / h)
+        return np.where(
+            uniform_filter1d(still.astype(float), long) > 1.0 - 0.5 / long,
+            uniform_filter1d(self.turned, long, mode="nearest"), self.turned,
+        )  # fmt: skip
+
     def once(self, key: tuple, compute: Callable[[], Any]) -> Any:
         """What does not depend on the point, computed at the first call with this key."""
         if key not in self._once:
@@ -139,7 +157,7 @@ class Signals:
         """A copy with other signals; what is masked and along what rows lie stays."""
         out = replace(self, **signals)
         out.speed_step, out.current_step = self.speed_step, self.current_step
-        out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self
+        out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self.rows_from
         return out
 
 

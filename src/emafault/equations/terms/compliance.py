@@ -25,7 +25,7 @@ def solve(rec, flexibility, damping, play, inertia):
         return None
     J = SHARE * inertia * a.inertia * a.gear_ratio**2
     position, torque = flexible_shaft(
-        rec.turned / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
+        rec.once(("quiet",), rec.quiet) / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
     )
     return position, torque / a.gear_ratio
 
