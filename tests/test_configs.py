@@ -244,3 +244,19 @@ def test_settings_of_the_check_of_the_evidence_are_checked(wrong, says, tmp_path
     monkeypatch.setattr(config, "CONF", tmp_path)
     with pytest.raises(InputError, match=says):
         config._evidence()
+
+
+def test_a_shifted_variant_is_evaluated_with_the_estimators_of_another():
+    plan = config.plan("shift_study")
+    base, *shifted = plan.cases
+    assert base.learnt == base.path and plan.learnt_from == "as_learnt"
+    assert {case.learnt for case in shifted} == {base.path}
+    assert "training" in base.parts and not any("training" in case.parts for case in shifted)
+
+
+@pytest.mark.parametrize("wanted", ["nothing", "friction_doubled"])
+def test_estimators_are_those_of_a_variant_that_learns_itself(tmp_path, wanted):
+    path = tmp_path / "mine.yaml"
+    path.write_text(f"# @package _global_\nvariants:\n  own: []\n  friction_doubled: [learnt_from={wanted}]\n")
+    with pytest.raises(InputError, match=f"learnt_from: '{wanted}' is no variant that learns itself, accepted are own"):
+        config.plan(str(path))

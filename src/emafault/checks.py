@@ -38,7 +38,7 @@ def check_configuration(config: Mapping[str, Any]) -> None:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    known = {*_SCHEMAS, "command", "reconstruction", "question", "unlisted"}
+    known = {*_SCHEMAS, "command", "reconstruction", "question", "unlisted", "learnt_from"}
     for key in config:
         if key not in known:
             raise InputError(schema.unknown_key(key, "", sorted(known)))
@@ -50,6 +50,8 @@ def check_configuration(config: Mapping[str, Any]) -> None:
         schema.refuse("question", config["question"], "text")
     for key in ("name", "dataset"):
         check_name(key, config[key])
+    if config["learnt_from"] is not None:
+        check_name("learnt_from", config["learnt_from"], parts=1)
     for variant in config["variants"]:
         check_name("variants", variant, parts=1)
     _check_named("command", config["command"], "name", schema.COMMANDS)

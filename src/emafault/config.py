@@ -25,7 +25,7 @@ from .plain import read_yaml
 #: groups whose options are chosen as a whole: ``magnet=smco``; experiments are chosen apart
 GROUPS = sorted(p.name for p in CONF.iterdir() if p.is_dir() and p.name not in ("effect", "experiment", "withheld"))
 #: keys of a composed configuration
-_KEYS = {*GROUPS, "name", "question", "dataset", "effects", "tolerances", "variants"}
+_KEYS = {*GROUPS, "name", "question", "dataset", "effects", "tolerances", "learnt_from", "variants"}
 #: groups that diagnosing a bench reads
 DIAGNOSED = ("actuator", "sensors", "tolerances", "tracking")
 LONGEST_KEY = 200
@@ -628,12 +628,14 @@ class Case:
     """One composed configuration and where its results stand.
 
     ``path`` is the experiment's name, for a study followed by the variant's; ``datasets`` maps each part to the name of
-    the dataset that holds it, which may be one that another experiment simulates likewise.
+    the dataset that holds it, which may be one that another experiment simulates likewise; ``learnt`` is the path of
+    the case whose estimators are evaluated, mostly its own.
     """
 
     path: str
     config: Mapping[str, Any]
     datasets: Mapping[str, str]
+    learnt: str
 
     @property
     def parts(self) -> list[str]:
@@ -660,6 +662,12 @@ class Plan:
     def case(self, path: str) -> Case:
         return next(case for case in self.cases if case.path == path)
 
+    @property
+    def learnt_from(self) -> str | None:
+        """The variant whose estimators others are evaluated with, None where each has its own."""
+        others = [case.learnt for case in self.cases if case.learnt != case.path]
+        return others[0].split("/")[-1] if others else None
+
 
 def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None) -> Plan:
     """Compose an experiment and, if it is a study, each of its variants.
@@ -679,7 +687,7 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     cases: list[Case] = []
     specs: dict[tuple[str, str], dict[str, Any]] = {}
     for path, config in configs.items():
-        case = Case(path, config, _datasets(path, config))
+        case = Case(path, config, _datasets(path, config), _learnt(top["name"], path, configs))
         for part, dataset in case.datasets.items():
             spec = dataset_spec(config, part)
             if specs.setdefault((dataset, part), spec) != spec:
@@ -688,9 +696,27 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     return Plan(top["name"], top["question"], tuple(cases))
 
 
+def _learnt(study: str, path: str, configs: Mapping[str, Mapping[str, Any]]) -> str:
+    """Path of the case whose estimators a case evaluates."""
+    wanted = configs[path]["learnt_from"]
+    if wanted is None:
+        return path
+    own = [p.split("/")[-1] for p, c in configs.items() if p != study and c["learnt_from"] is None]
+    if wanted not in own:
+        accepted = ", ".join(own) or "none, for it is no study or all its variants name another"
+        raise InputError(f"learnt_from: '{shown(wanted)}' is no variant that learns itself, accepted are {accepted}")
+    owner = f"{study}/{wanted}"
+    if configs[owner]["reconstruction"] != configs[path]["reconstruction"]:
+        raise InputError(
+            f"learnt_from: {path} and {owner} do not have the same reconstruction, they cannot be compared"
+        )
+    return owner
+
+
 def _datasets(path: str, config: Mapping[str, Any]) -> dict[str, str]:
     """Each part under the name that ``dataset`` gives where that experiment simulates the same, else under its own."""
-    parts = [p for p in PARTS if p != "reference" or config["unit"]["reference_recordings"]]
+    needed = {"reference": config["unit"]["reference_recordings"], "training": config["learnt_from"] is None}
+    parts = [p for p in PARTS if needed.get(p, True)]
     owner = config["dataset"]
     if owner == path:
         return dict.fromkeys(parts, path)

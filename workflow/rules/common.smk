@@ -168,7 +168,8 @@ def estimators(wildcards):
             *(["searched"] if method == searched else []),
         )
     ]
-    return [f"{RESULTS}/experiments/{wildcards.case}/identifiers/{name}" for name in names]
+    owner = PLAN.case(wildcards.case).learnt
+    return [f"{RESULTS}/experiments/{owner}/identifiers/{name}" for name in names]
 
 
 def exported_network(wildcards):
@@ -213,6 +214,7 @@ def title_and_question(wildcards):
 def data_of_case(wildcards):
     """What MLflow is told of the data sets of a case; equal digests are of equal numbers."""
     case, simulated = PLAN.case(wildcards.case), code("simulate_shard")
+    datasets = {"training": PLAN.case(case.learnt).datasets["training"], **case.datasets}
     return [
         {
             "name": f"{name}/{part}",
@@ -221,7 +223,7 @@ def data_of_case(wildcards):
             "context": {"training": "training", "fresh": "evaluation", "reference": "calibration"}[part],
             "rows": PLAN.dataset(name, part)["runs"],
         }
-        for part, name in case.datasets.items()
+        for part, name in datasets.items()
     ]
 
 

@@ -80,6 +80,7 @@ if PLAN.is_study:
                 "title": PLAN.name,
                 "question": PLAN.question,
                 "variants": [case.path.split("/")[-1] for case in PLAN.cases],
+                "learnt_from": PLAN.learnt_from,
             },
             code=code("compare_variants"),
         script:

@@ -24,6 +24,8 @@ BOUND_OF = {
     "recording": "all intervals of the recordings",
 }
 OUTPUTS = {"N": ("N", 1.0, 5), "xi": ("ξ", 1.0, 5), "dT": ("ΔT (K)", 1.0, 3)}
+WORSE = 1.2  # times the error over its bound, from which a shift is told
+MOVED = " ▲"
 CHOICES = (
     "The paper gives no motor, controller or noise figures. Those used here are this project's choices (conf/actuator, "
     "conf/sensors); the paper fixes the faults and their ranges, the copper coefficient, the parabolic command, 600 "
@@ -267,13 +269,21 @@ def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.
 
 
 def compare_variants(
-    title: str, question: str, names: Sequence[str], metrics: Sequence[str], output: str | Path, figures: str | Path
+    title: str,
+    question: str,
+    names: Sequence[str],
+    metrics: Sequence[str],
+    output: str | Path,
+    figures: str | Path,
+    learnt_from: str | None = None,
 ) -> None:
     """Write the report that compares a study's variants; each has a report of its own beside it.
 
     Parameters
     ----------
-    names : variants, in order; metrics : their metrics
+    names : variants, in order
+    metrics : their metrics
+    learnt_from : the variant whose estimators the others are evaluated with, if they are
 
     Raises
     ------
@@ -307,9 +317,45 @@ def compare_variants(
             for n, name in enumerate(names)
         ]
         page.table(["variant", *columns], rows)
+    if learnt_from is not None:
+        _shifts(page, names, tables, learnt_from)
     page.paragraph("The reports of the single variants stand in the folders beside this page.", "small")
     page.paragraph(CHOICES)
     page.write(output)
+
+
+def _shifts(page: Page, names: Sequence[str], tables: Sequence[Mapping[str, Any]], base: str) -> None:
+    """What recordings cost that the estimators were not made for: error over its bound, coverage, runs without one."""
+    at = list(names).index(base)
+    told = []
+    for output, (label, _, _) in OUTPUTS.items():
+        page.heading(f"Mean absolute error of {label} over its bound")
+        rows = []
+        for n, name in enumerate(names):
+            row = [name]
+            for k, entry in enumerate(tables[n]["results"]):
+                ratio = _value(entry["all"], f"errors.{output}.ratio")
+                moved = ratio / _value(tables[at]["results"][k]["all"], f"errors.{output}.ratio")
+                row.append(f"{ratio:.2f}" + (MOVED if moved > WORSE else ""))
+                if moved > WORSE:
+                    told.append((moved, label, name, named(entry["method"], entry["estimator"])))
+            rows.append(row)
+        page.table(["variant", *(named(r["method"], r["estimator"]) for r in tables[0]["results"])], rows)
+    page.paragraph(
+        f"{MOVED.strip()} marks what is more than {WORSE:g} times that of {base}: the bound is that of a variant's own "
+        f"recordings, the estimators are those of {base}.", "small",
+    )  # fmt: skip
+    most = [f"{o} by {method} under {name} ({x:.1f} times)" for x, o, name, method in sorted(told, reverse=True)[:5]]
+    page.paragraph(f"Moved most: {', '.join(most)}." if told else f"Nothing moves by more than {WORSE:g}.")
+    page.heading("Intervals and what is left without a result")
+    shares = [
+        [name, *(f"{_value(r['all'], 'coverage.mean'):.3f} ({r['unidentified']})" for r in tables[n]["results"])]
+        for n, name in enumerate(names)
+    ]
+    page.table(["variant", *(named(r["method"], r["estimator"]) for r in tables[0]["results"])], shares)
+    level = f"{tables[0]['level']:.0%}"
+    text = f"Coverage of {level} intervals, mean over the outputs; in brackets runs that cannot be identified."
+    page.paragraph(text, "small")
 
 
 def _ranking(names: Sequence[str], lines: Mapping[str, Mapping[str, Sequence[float]]]) -> str:
