@@ -103,7 +103,7 @@ def check_trained(config: Mapping[str, Any]) -> None:
     _check_reconstruction(config.get("reconstruction"))
 
 
-def check_name(key: str, name: str, parts: int = 2) -> None:
+def check_name(key: str, name: Any, parts: int = 2) -> None:
     """Refuse what cannot be a folder of results, and what YAML, a page or the workflow would read as something else.
 
     Parameters
@@ -114,8 +114,8 @@ def check_name(key: str, name: str, parts: int = 2) -> None:
     ------
     InputError : naming the key and what is accepted
     """
-    words = name.split("/")
-    good = len(words) <= parts and all(word and set(word) <= _NAME and word[0] not in ".-" for word in words)
+    words = name.split("/") if isinstance(name, str) else []
+    good = 0 < len(words) <= parts and all(word and set(word) <= _NAME and word[0] not in ".-" for word in words)
     if not good or len(name) > LONGEST_NAME:
         accepted = f"letters, digits, _, - and ., at most {LONGEST_NAME}, a letter, digit or _ first"
         raise InputError(f"{key}: got {shown(repr(name))}, accepted are {accepted}")
