@@ -623,6 +623,44 @@ def evidence_spec() -> dict[str, Any]:
     return recursively_sorted(_pick(compose(), "actuator", "sensors") | {"evidence": _evidence()})
 
 
+def _design() -> dict[str, Any]:
+    """The settings of conf/optimal_command.yaml.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    read = read_yaml(CONF / "optimal_command.yaml")
+    schema.check(read, schema.Design, "optimal_command")
+    if not read["lengths"]:
+        schema.refuse("optimal_command.lengths", read["lengths"], "a list of one length or more (s)")
+    for name, ends in read["space"].items():
+        if name not in schema.COMMANDS or name == "file":
+            raise InputError(schema.unknown_key(name, "optimal_command.space", schema.COMMANDS.keys() - {"file"}))
+        for end in ("low", "high"):
+            settings = {"name": name, **{key: float(value[end]) for key, value in ends.items()}}
+            schema.check(settings, schema.COMMANDS[name], f"optimal_command.space.{name}")
+    return read
+
+
+def design_lengths() -> list[float]:
+    """Lengths (s) of recording for which a command is searched."""
+    return _design()["lengths"]
+
+
+def design_spec() -> dict[str, Any]:
+    """What the search for the command that identifies best reads."""
+    design = _design()
+    config = compose(design["experiment"], ["reconstruction=[weighted_floating,nine]"])
+    spec = {
+        "design": design,
+        "dataset": dataset_spec(config, "fresh"),
+        "known": known(config),
+        "magnet_coefficient": magnet_coefficient(config),
+    }
+    return recursively_sorted(spec)
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.
@@ -670,6 +708,7 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     """
     check_draws()
     _evidence()
+    _design()
     texts = split_overrides(overrides)
     top = compose(experiment, texts)
     if top["variants"]:

@@ -206,6 +206,40 @@ class Evidence:
 
 
 @dataclass
+class DesignLimits:
+    speed: float = number(POSITIVE, 1e5, "rad/s")
+    travel: float = number(POSITIVE, 100.0, "rad")
+    supply: float = number(POSITIVE, 1.0, "of the bus voltage")
+    heating: float = number(POSITIVE, 500.0, "K")
+    heat_capacity: float = number(POSITIVE, 1e6, "J/K")
+
+
+@dataclass
+class Ends:
+    low: float = number()
+    high: float = number()
+
+
+@dataclass
+class LoadEnds:
+    constant: Ends = group()
+    spring: Ends = group()
+
+
+@dataclass
+class Design:
+    experiment: str = choice()
+    lengths: list[float] = number(0.2, 60.0, "s")
+    trials: int = number(2, 100_000)
+    seed: int = number(0, 2**31)
+    faults: int = number(1, 1000)
+    fresh: int = number(10, 1_000_000)
+    limits: DesignLimits = group()
+    load: LoadEnds = group()
+    space: dict[str, dict[str, Ends]] = group()
+
+
+@dataclass
 class Tracking:
     uri: str = choice()
     experiment: str = choice()

@@ -220,7 +220,7 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     from ..actuator.commands import command_positions
     from ..actuator.simulate import simulate
     from ..actuator.unlisted import in_machine
-    from ..identification.posterior import Knowledge, nine_forward, posterior
+    from ..identification.posterior import Knowledge, least_errors
     from ..reconstruction.bounds import cramer_rao_bound, nine_bound
 
     part = spec["dataset"]
@@ -250,11 +250,8 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
             found[name].append(bound.standard_error)
         nine = nine_bound(clean, interval, actuator, noise, {"discard": spec["discard"]})
         rows = slice(start, start + len(nine))
-        true = nine_forward(faults[rows], actuator, alpha_m, sample.dT_magnet[rows])
-        least = posterior(
-            true, nine + known.covariance() * true[:, :, None] * true[:, None, :], actuator, alpha_m, known
-        )
-        found["recording"].append(np.sqrt(np.diagonal(least.covariance, axis1=1, axis2=2)))
+        least = least_errors(faults[rows], nine, actuator, alpha_m, known, sample.dT_magnet[rows])
+        found["recording"].append(least)
     data = xr.Dataset(
         {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
         | {"fault": (("run", "component"), faults)},
