@@ -661,6 +661,25 @@ def design_spec() -> dict[str, Any]:
     return recursively_sorted(spec)
 
 
+def several_spec() -> dict[str, Any]:
+    """What identifying one fault from several recordings reads: conf/several_recordings.yaml and its experiments.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    read = read_yaml(CONF / "several_recordings.yaml")
+    schema.check(read, schema.Several, "several_recordings")
+    if not read["counts"]:
+        schema.refuse("several_recordings.counts", read["counts"], "a list of one number or more")
+    own = []
+    for name in read.pop("experiments"):
+        config = compose(name)
+        parts = {"dataset": dataset_spec(config, "fresh"), "known": known(config), "name": name}
+        own.append(parts | {"alpha_m": magnet_coefficient(config), "question": config["question"]})
+    return recursively_sorted({"settings": read, "experiments": own})
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.

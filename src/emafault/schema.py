@@ -240,6 +240,14 @@ class Design:
 
 
 @dataclass
+class Several:
+    experiments: list[str] = choice()
+    counts: list[int] = number(1, 64)
+    units: int = number(10, 1_000_000)
+    seed: int = number(0, 2**31)
+
+
+@dataclass
 class Tracking:
     uri: str = choice()
     experiment: str = choice()

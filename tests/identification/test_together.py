@@ -92,7 +92,8 @@ def bench():
     one = [0.05, 0.01, 0.03, 0.05, -0.1]
     faults = [[*one, -20.0], [*one, 10.0], [*one, 50.0], [0.02, 0.01, 0.03, 0.05, -0.1, 10.0]]
     made = [simulate_recording({**spec, "tolerance": 0.0, "seed": n}, fault) for n, fault in enumerate(faults)]
-    return [replace(recording, attributes={"health": "unknown"}, name=f"{n}.nc") for n, recording in enumerate(made)], faults
+    unknown = {"attributes": {"health": "unknown"}}
+    return [replace(recording, name=f"{n}.nc", **unknown) for n, recording in enumerate(made)], faults
 
 
 @pytest.mark.parametrize("experiment", ["paper", "nine_features"])
