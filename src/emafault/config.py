@@ -354,6 +354,7 @@ def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
         "discard": min((entry["discard"] for entry in methods), default=config["recording"]["discard"]),
         "magnet_coefficient": magnet_coefficient(config),
         "known": known(config),
+        "heating": any(entry.get("heating") for entry in methods),
     }
     return recursively_sorted(spec)
 
@@ -416,7 +417,7 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
 def _bound_beside(entry: Mapping[str, Any]) -> str:
     """Which bound an entry of the group reconstruction stands beside, see ``study.features.compute_bound``."""
     if entry["method"] == "nine":
-        return "recording"
+        return "heating" if entry["heating"] else "recording"
     return "plateau" if entry["method"] == "weighted" and not entry["floating"] else "floating"
 
 

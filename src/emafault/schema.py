@@ -294,6 +294,7 @@ RECONSTRUCTIONS: dict[str, type] = {
             ("plateau_width", float, number(30.0, 180.0, "electrical degrees")),
             ("zero_current", float, number(0.0, 10.0, "A")),
             ("noise", dict[str, float] | None, group()),
+            ("heating", bool, group()),
         ],
     ),
     "angle_resolved": make_dataclass(

@@ -110,7 +110,7 @@ def _most_accurate(folder: Path | None, config: Mapping[str, Any], known: set[st
     path = folder / "evaluation" / "metrics.json" if folder is not None else None
     if path is None or not os.path.lexists(path):
         methods = list(config["reconstruction"])
-        best = next((name for name in ("nine", "weighted_floating") if name in methods), methods[-1])
+        best = next((name for name in ("nine_heating", "nine", "weighted_floating") if name in methods), methods[-1])
         return f"{best}/closed_form"
     errors = _errors(path, read_json(path))
     return min((name for name in errors if name in known), key=lambda name: errors[name])

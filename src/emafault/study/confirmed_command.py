@@ -69,7 +69,7 @@ def fresh_errors(judge: Judge, design: Design) -> dict[str, Any]:
         demands.append(judge.asked(clean, rows))
         least.append(judge.least(clean, rows))
         noisy = measure(clean, judge.records[rows], SensorNoise(**judge.sensors), judge.seed, start)
-        parts.append(reconstruct("nine", noisy, judge.interval, judge.actuator, {}))
+        parts.append(reconstruct("nine", noisy, judge.interval, judge.actuator, {"heating": True}))
     judged = Judged(
         by_group(MAE * np.concatenate(least)), {name: max(asked[name] for asked in demands) for name in LIMITS}
     )
@@ -109,8 +109,9 @@ def draw_commands(
     header = ["length (s)", "", "design", "N", "over bound", "ξ", "over bound", "ΔT (K)", "over bound", "coverage"]
     page.table(header, [_row(entry) for entry in entries])
     text = (
-        f"Closed form of nine features on {settings['fresh']} fresh runs each, mean absolute errors, over the bound of "
-        "these recordings, and coverage of 90 % intervals. What breaks a limit is not identified."
+        "Closed form of nine features, with the rate at which the winding warms an unknown, on "
+        f"{settings['fresh']} fresh runs each: mean absolute errors, over the bound of these recordings, and coverage of "
+        "90 % intervals. What breaks a limit is not identified."
     )
     page.paragraph(text, "small")
     page.heading("What is asked of the actuator")
@@ -122,7 +123,7 @@ def draw_commands(
     page.table(header, rows, strong=[0])
     text = (
         "Largest over the fresh runs: the motor's speed; the output's travel; mean voltage between two phases over "
-        "2 ms; heating of the winding by its losses, "
+        "2 ms; heating of the winding by its losses, which the recordings have, "
         f"with a heat capacity of {settings['limits']['heat_capacity']:g} J/K."
     )
     page.paragraph(text, "small")

@@ -17,7 +17,7 @@ from ..reconstruction.calibration import calibrate
 from .features import FeatureTable, read_features
 from .networks import HISTORY, folders, seed_folder, width_of, write_json
 
-BOUNDS = ("plateau", "floating", "recording")
+BOUNDS = ("plateau", "floating", "recording", "heating")
 FEW = 10  # rows of the paper's external validation
 _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
 

@@ -204,7 +204,8 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
 
     ``plateau`` and ``floating`` are those of six features, from plateau samples and with floating ones too;
     ``recording`` is that of all intervals of the recording with L among the coefficients, and with what is known of R0,
-    k0, L0 and the magnets' lag beforehand. They are NaN where the bounds do not hold: without noise, and under the
+    k0, L0 and the magnets' lag beforehand, ``heating`` the same where the rate at which the winding warms is unknown,
+    too (NaN where no method asks for it). They are NaN where the bounds do not hold: without noise, and under the
     rotor-angle laws, whose R, k carry no xi.
 
     Parameters
@@ -233,7 +234,7 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     runs, faults = sample.records(slice(spec["runs"])), sample.faults[: spec["runs"]]
     actuator, known = ActuatorParameters(**part["actuator"]), Knowledge(**spec["known"])
     alpha_m = spec["magnet_coefficient"]
-    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": [], "recording": []}
+    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": [], "recording": [], "heating": []}
     holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
     for start in progress(range(0, len(runs), BLOCK), "bound", -(-len(runs) // BLOCK)):
         if not holds:
@@ -248,10 +249,14 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
             choice = {"discard": spec["discard"], "floating": name == "floating"}
             bound = cramer_rao_bound(clean, interval, actuator, noise, choice, alpha_m)
             found[name].append(bound.standard_error)
-        nine = nine_bound(clean, interval, actuator, noise, {"discard": spec["discard"]})
-        rows = slice(start, start + len(nine))
-        least = least_errors(faults[rows], nine, actuator, alpha_m, known, sample.dT_magnet[rows])
-        found["recording"].append(least)
+        rows = slice(start, start + len(some))
+        for name, heating in (("recording", False), ("heating", True)):
+            least = np.full((len(some), 6), np.nan)
+            if not heating or spec["heating"]:
+                choice = {"discard": spec["discard"], "heating": heating}
+                nine = nine_bound(clean, interval, actuator, noise, choice)
+                least = least_errors(faults[rows], nine, actuator, alpha_m, known, sample.dT_magnet[rows])
+            found[name].append(least)
     data = xr.Dataset(
         {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
         | {"fault": (("run", "component"), faults)},

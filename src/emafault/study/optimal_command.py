@@ -3,7 +3,8 @@
 A design is a command with its parameters, a length of recording and a load. It is judged by the Cramer-Rao bound of
 the nine features of its own noise-free recordings (Fisher information; Goodwin and Payne, Dynamic System
 Identification, 1977, chapter 6), averaged over a few fault vectors: the geometric mean over N, xi and dT of the bound
-over that of the paper's command. What would break a limit of speed, travel, supply or heating for any of the fault
+over that of the paper's command. The losses warm the winding as it is recorded, at a rate that counts as unknown; dT
+is that at the start. What would break a limit of speed, travel, supply or heating for any of the fault
 vectors is refused by the search, which is Optuna's TPE with constraints.
 """
 
@@ -118,15 +119,16 @@ class Judge:
         self.alpha_m = spec["magnet_coefficient"]
 
     def simulate(self, design: Design, rows: slice = slice(None)) -> dict[str, np.ndarray]:
-        """Noise-free signals of the fault vectors under a design."""
+        """Noise-free signals of the fault vectors under a design, whose losses warm the winding."""
         runs = self.records[rows].copy()
-        set_effects(runs, design.effects())
+        warming = {"heating_rate": 1.0 / self.settings["limits"]["heat_capacity"]}
+        set_effects(runs, {**design.effects(), "self_heating": warming})
         positions = design.positions(self.actuator.control_period)
         return simulate(runs, positions, design.length, self.interval)
 
     def least(self, clean: Mapping[str, np.ndarray], rows: slice = slice(None)) -> np.ndarray:
         """(run, 6) standard errors at the bound of noise-free recordings, NaN where an unknown is undetermined."""
-        nine = nine_bound(clean, self.interval, self.actuator, self.sensors, {"discard": 0.0})
+        nine = nine_bound(clean, self.interval, self.actuator, self.sensors, {"heating": True})
         errors, told = np.full((len(nine), 6), np.nan), np.all(np.isfinite(nine), axis=(1, 2))
         faults, magnets = self.faults[rows][told], self.dT_magnet[rows][told]
         errors[told] = least_errors(faults, nine[told], self.actuator, self.alpha_m, self.known, magnets)
