@@ -110,8 +110,8 @@ def draw_commands(
     page.table(header, [_row(entry) for entry in entries])
     text = (
         "Closed form of nine features, with the rate at which the winding warms an unknown, on "
-        f"{settings['fresh']} fresh runs each: mean absolute errors, over the bound of these recordings, and coverage of "
-        "90 % intervals. What breaks a limit is not identified."
+        f"{settings['fresh']} fresh runs each: mean absolute errors, over the bound of these recordings, and coverage "
+        "of 90 % intervals. What breaks a limit is not identified."
     )
     page.paragraph(text, "small")
     page.heading("What is asked of the actuator")
