@@ -347,6 +347,7 @@ def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any
 
 def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     """What the Cramer-Rao bounds of the fresh rows read: all samples that any least-squares method uses."""
+    repeats = config["unit"]["reference_recordings"]
     methods = [entry for entry in config["reconstruction"].values() if entry["method"] != "paper"]
     spec = {
         "dataset": dataset_spec(config, "fresh"),
@@ -354,7 +355,9 @@ def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
         "discard": min((entry["discard"] for entry in methods), default=config["recording"]["discard"]),
         "magnet_coefficient": magnet_coefficient(config),
         "known": known(config),
-        "heating": any(entry.get("heating") for entry in methods),
+        "heating": any(entry.get("heating", False) for entry in methods),
+        "reference": dataset_spec(config, "reference") if repeats else None,
+        "ambient_error": config["sensors"]["ambient"],
     }
     return recursively_sorted(spec)
 

@@ -130,28 +130,6 @@ def posterior(
     return Posterior(x[:, :6], spread[:, :6, :6], misfit)
 
 
-def least_errors(
-    faults: np.ndarray,
-    covariance: np.ndarray,
-    actuator: ActuatorParameters,
-    alpha_m: float,
-    known: Knowledge,
-    dT_magnet: np.ndarray | None = None,
-) -> np.ndarray:
-    """(run, 6) smallest standard errors of faults, with what is known beforehand, from that of their coefficients.
-
-    Parameters
-    ----------
-    faults : (run, 6) true ones
-    covariance : (run, 9, 9) smallest of [R, k, L] (SI), as of ``reconstruction.bounds.nine_bound``
-    dT_magnet : (run,) K above the reference temperature; None puts the magnets at the winding's
-    """
-    true = nine_forward(faults, actuator, alpha_m, dT_magnet)
-    whole = covariance + known.covariance() * true[:, :, None] * true[:, None, :]
-    least = posterior(true, whole, actuator, alpha_m, known).covariance
-    return np.sqrt(np.diagonal(least, axis1=1, axis2=2))
-
-
 def model_error(
     nine: np.ndarray, covariance: np.ndarray, actuator: ActuatorParameters, alpha_m: float, known: Knowledge
 ) -> np.ndarray:

@@ -22,9 +22,10 @@ from ..closed_form import forward
 from ..dataset import sample_runs
 from ..errors import InputError
 from ..identification.evaluation import GROUPS
-from ..identification.posterior import Knowledge, least_errors
+from ..identification.posterior import Knowledge
 from ..progress import progress
 from ..reconstruction.bounds import nine_bound
+from .calibrated_bound import least_of
 from .networks import write_json
 
 WINDOW = 2e-3  # s, over which what is asked of the supply is averaged
@@ -131,7 +132,8 @@ class Judge:
         nine = nine_bound(clean, self.interval, self.actuator, self.sensors, {"heating": True})
         errors, told = np.full((len(nine), 6), np.nan), np.all(np.isfinite(nine), axis=(1, 2))
         faults, magnets = self.faults[rows][told], self.dT_magnet[rows][told]
-        errors[told] = least_errors(faults, nine[told], self.actuator, self.alpha_m, self.known, magnets)
+        of_run = faults, self.actuator, self.alpha_m, self.known, magnets
+        errors[told] = least_of(nine[told], self.known.covariance(), *of_run)
         return errors
 
     def asked(self, clean: Mapping[str, np.ndarray], rows: slice = slice(None)) -> dict[str, float]:

@@ -14,6 +14,7 @@ from ..reporting import paper as paper_figures
 from ..reporting import search as search_figures
 from ..reporting.page import Page
 from ..reporting.style import named
+from .bound import CALIBRATED
 from .networks import folders
 
 #: what the paper reports on ten fresh rows
@@ -150,8 +151,10 @@ def _finding(table: Mapping[str, Any]) -> str:
         text += (
             "The units evaluated differ within their specification. Calibrated on healthy recordings of each, "
             f"{named(best['method'], best['estimator'])} errs by {_value(calibrated, 'errors.dT.mae'):.3g} K, "
-            f"{_value(calibrated, 'errors.N.mae'):.2g} and {_value(calibrated, 'errors.xi.mae'):.2g}."
+            f"{_value(calibrated, 'errors.N.mae'):.2g} and {_value(calibrated, 'errors.xi.mae'):.2g}"
         )
+        bound = table["bound"].get(best["bound"] + CALIBRATED)
+        text += f"; the bound of both recordings is {_in_words(bound)}." if bound else "."
     return text
 
 
@@ -207,7 +210,8 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
             errors[(entry["method"], entry["estimator"] + suffix)] = found[f"{key}.value"] - found[f"{key}.truth"]
     for name, bound in table["bound"].items():
         if bound:
-            row = [f"Cramér-Rao bound, {BOUND_OF[name]}", ""]
+            suffix = ", calibrated" if name.endswith(CALIBRATED) else ""
+            row = [f"Cramér-Rao bound, {BOUND_OF[name.removesuffix(CALIBRATED)]}{suffix}", ""]
             for output, (_, _, digits) in OUTPUTS.items():
                 row += [f"{bound[output]:.{digits}f}", "1"]
             rows.append([*row, "", ""])
@@ -216,8 +220,8 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
     text = (
         "Mean absolute errors on fresh rows; ± is the standard deviation over seeds. Rows named weighted use plateau "
         "samples and stand beside that bound, those named nine beside the recordings' own, nine heating beside that of "
-        "a winding that warms at an unknown rate, all others beside the bound with floating-phase samples. The bounds of "
-        "six features come from the voltage-current-speed equations with R, "
+        "a winding that warms at an unknown rate, all others beside the bound with floating-phase samples. The bounds "
+        "of six features come from the voltage-current-speed equations with R, "
         "k, L and offset of each phase free; the magnets' lag behind the winding and the healthy unit's R and k count "
         "as known to them. That of the recordings comes from all intervals, with L a coefficient of the fault and what "
         "is known beforehand of R, k, L and the lag as the configuration says (unit.known, magnet.lag)."
