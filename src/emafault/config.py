@@ -330,6 +330,8 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
     for key in ("unlisted", "tolerances"):
         if config[key]:
             spec[key] = config[key]
+    if recording["filter"]["kind"] != "none":
+        spec["recording"]["filter"] = recording["filter"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)

@@ -17,6 +17,7 @@ from typing import Any
 from .actuator import grammar
 from .actuator.parameters import ECCENTRICITY_LAWS, ActuatorParameters
 from .errors import InputError, shown
+from .filters import FILTERS
 
 
 def number(low: float = -math.inf, high: float = math.inf, unit: str = "") -> Any:
@@ -111,11 +112,19 @@ class Load:
 
 
 @dataclass
+class Filter:
+    kind: str = choice(*FILTERS)
+    cutoff: float = number(1.0, 1e5, "Hz")
+    before_noise: bool = group()
+
+
+@dataclass
 class RecordingConditions:
     duration: float = number(0.2, 3600.0, "s")
     discard: float = number(0.0, 3600.0, "s")
     interval: float = number(1e-5, 1e-2, "s")
     theta_0: AngleRange = group()
+    filter: Filter = group()
 
 
 @dataclass
