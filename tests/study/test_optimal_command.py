@@ -89,7 +89,7 @@ def test_settings_that_do_not_fit_are_refused(monkeypatch, tmp_path):
     text = (config.CONF / "optimal_command.yaml").read_text()
     for old, new, says in (
         ("speed: {low: 0.02, high: 0.8}", "velocity: {low: 0.02, high: 0.8}", "velocity"),
-        ("trials: 150", "trials: 1", "trials"),
+        ("trials: 200", "trials: 1", "trials"),
         ("  ramp:", "  leap:", "leap"),
     ):
         (tmp_path / "optimal_command.yaml").write_text(text.replace(old, new))

@@ -180,16 +180,58 @@ def search_command(spec: Mapping[str, Any], length: float, output: str | Path) -
 
 
 def search(judge: Judge, first: Design, spec: Mapping[str, Any], load: bool = False) -> list[dict[str, Any]]:
-    """Trials of a search, the best first and those that break a limit last; ``first`` is tried first."""
+    """Trials of a search, the best first and those that break a limit last; ``first`` is tried first.
+
+    Half of the trials are over all kinds of command, the rest about the best of the two best kinds.
+    """
+    settings = judge.settings
+    scale = judge(paper_design(spec, spec["dataset"]["recording"]["duration"]))
+    ends = settings["load"] if load else {}
+    narrow = settings["trials"] // 4
+    trials = _search(judge, scale, settings["space"], ends, first, settings["trials"] - 2 * narrow)
+    for trial in _best_of_kinds(trials)[:2]:
+        about = design_of(trial)
+        name = about.command["name"]
+        space = {name: _about(settings["space"][name], about.command, 0.5)}
+        loads = {key: _near(ends[key], getattr(about, key), 0.25) for key in ends}
+        trials += _search(judge, scale, space, loads, about, narrow)
+    return sorted(trials, key=lambda t: (bool(t["breaches"]), t["score"] if np.isfinite(t["score"]) else np.inf))
+
+
+def _best_of_kinds(trials: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The best trial of each kind of command that has one within limits, the best first."""
+    kinds: dict[str, dict[str, Any]] = {}
+    for trial in sorted((t for t in trials if not t["breaches"]), key=lambda t: t["score"]):
+        kinds.setdefault(trial["command"]["name"], trial)
+    return list(kinds.values())
+
+
+def _about(space: Mapping[str, Any], settings: Mapping[str, Any], share: float) -> dict[str, dict[str, float]]:
+    """Ends of a command's parameters from a share of a value to its inverse."""
+    return {
+        key: {"low": max(ends["low"], share * settings[key]), "high": min(ends["high"], settings[key] / share)}
+        for key, ends in space.items()
+    }
+
+
+def _near(ends: Mapping[str, float], value: float, share: float) -> dict[str, float]:
+    """Ends within a share of their range about a value."""
+    reach = share * (ends["high"] - ends["low"])
+    return {"low": max(ends["low"], value - reach), "high": min(ends["high"], value + reach)}
+
+
+def _search(
+    judge: Judge, scale: Judged, space: Mapping[str, Any], loads: Mapping[str, Any], first: Design, count: int
+) -> list[dict[str, Any]]:
+    """So many trials within ends; ``first`` is tried first where it lies within them."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    settings, limits = judge.settings, judge.settings["limits"]
-    scale = judge(paper_design(spec, spec["dataset"]["recording"]["duration"]))
+    limits = judge.settings["limits"]
     trials: list[dict[str, Any]] = []
 
     def objective(trial) -> float:
-        design = _suggest(trial, settings, first.length, load)
+        design = _suggest(trial, space, first.length, loads)
         judged = judge(design)
         score = judged.score(scale)
         known = np.isfinite(score)
@@ -197,30 +239,25 @@ def search(judge: Judge, first: Design, spec: Mapping[str, Any], load: bool = Fa
         for limit in LIMITS:
             trial.set_constraint(limit, judged.demand[limit] / limits[limit] - 1.0)
         trial.set_constraint("undetermined", 0.0 if known else 1.0)
-        trials.append(
-            vars(design) | {"bound": judged.bound, "demand": judged.demand, "breaches": breaches, "score": score}
-        )
+        trials.append(vars(design) | {**vars(judged), "breaches": breaches, "score": score})
         return float(np.log(score)) if known else UNDETERMINED
 
-    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=settings["seed"]))
+    sampler = optuna.samplers.TPESampler(seed=judge.settings["seed"])
+    study = optuna.create_study(sampler=sampler)
     name = first.command["name"]
-    inside = {f"{name}.{key}": float(value) for key, value in first.command.items() if key != "name"}
-    if name in settings["space"]:
-        given = {"command": name, **inside}
-        study.enqueue_trial(given | ({"constant": first.constant, "spring": first.spring} if load else {}))
-    for _ in progress(range(settings["trials"]), f"search {first.length:g} s", settings["trials"]):
+    if name in space:
+        given = {f"{name}.{key}": float(value) for key, value in first.command.items() if key != "name"}
+        study.enqueue_trial({"command": name, **given, **{key: getattr(first, key) for key in loads}})
+    for _ in progress(range(count), f"search {first.length:g} s", count):
         study.optimize(objective, n_trials=1)
-    return sorted(trials, key=lambda t: (bool(t["breaches"]), t["score"] if np.isfinite(t["score"]) else np.inf))
+    return trials
 
 
-def _suggest(trial, settings: Mapping[str, Any], length: float, load: bool) -> Design:
-    name = trial.suggest_categorical("command", sorted(settings["space"]))
-    ends = settings["space"][name]
-    own = {key: trial.suggest_float(f"{name}.{key}", e["low"], e["high"], log=True) for key, e in ends.items()}
-    if not load:
-        return Design({"name": name, **own}, length)
-    on = {key: trial.suggest_float(key, e["low"], e["high"]) for key, e in settings["load"].items()}
-    return Design({"name": name, **own}, length, on["constant"], on["spring"])
+def _suggest(trial, space: Mapping[str, Any], length: float, loads: Mapping[str, Any]) -> Design:
+    name = trial.suggest_categorical("command", sorted(space))
+    own = {key: trial.suggest_float(f"{name}.{key}", e["low"], e["high"], log=True) for key, e in space[name].items()}
+    on = {key: trial.suggest_float(key, e["low"], e["high"]) for key, e in loads.items()}
+    return Design({"name": name, **own}, length, **on)
 
 
 def best(trials: list[dict[str, Any]]) -> Design:
