@@ -10,7 +10,7 @@ from emafault.api.identification import identify
 from emafault.dataset import simulate_recording
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
-from emafault.identification.posterior import Knowledge, posterior
+from emafault.identification.posterior import Knowledge, nominal_nine, posterior
 from emafault.identification.together import together
 
 from .conftest import RANGES
@@ -83,6 +83,23 @@ def test_more_recordings_tell_more_but_not_what_the_unit_is_off_by(actuator):
     assert np.all(eight[:5] < one[:5] / 8**0.5 * 1.02)
     off = Knowledge(R=0.01)
     assert errors(8, off)[5] > 0.95 * errors(1, off)[5] > 2.0
+
+
+def test_what_healthy_recordings_leave_open_is_shared(actuator):
+    rng = np.random.default_rng(9)
+    nominal, pulls, alone = nominal_nine(actuator), [], []
+    for n in range(200):
+        faults = np.repeat(sample_faults(1, seed=n, **RANGES), EACH, axis=0)
+        off = 1.0 + 0.02 * rng.standard_normal(9)
+        nine, covariance = measured(actuator, faults, 500 + n, unit=off)
+        error = 2e-3 * rng.standard_normal(9)
+        unit, unit_covariance = nominal * off * (1.0 + error), np.diag((2e-3 * nominal * off) ** 2)
+        found = together(nine, covariance, actuator, 0.0, Knowledge(), unit, unit_covariance)
+        pulls.append((found.faults[0] - faults[0]) / np.sqrt(np.diagonal(found.covariance[0])))
+        one = together(nine[:1], covariance[:1], actuator, 0.0, Knowledge(), unit, unit_covariance)
+        alone.append(np.diagonal(one.covariance[0]) / np.diagonal(found.covariance[0]))
+    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, atol=3.5 / np.sqrt(2 * 200))
+    assert np.all(np.mean(alone, axis=0) < 0.9 * EACH)  # four recordings are worth less than four times one
 
 
 @pytest.fixture(scope="module")
