@@ -2,8 +2,8 @@
 
 The healthy recordings bound the unit's R0 and k0 (and L0) at the reference temperature as the recording itself bounds
 R and k: by the Cramer-Rao covariance of their own noise-free signals, with the error of the ambient temperature at
-which they were soaked, what "healthy" leaves open and what is known of any unit beforehand (``calibrate``). That
-covariance is added to the recording's, relative to each coefficient.
+which they were soaked and what is known of any unit beforehand (``calibrate``). That covariance is added to the
+recording's, relative to each coefficient. Simulated healthy units are exactly healthy, which no estimator knows.
 """
 
 from collections.abc import Mapping
@@ -106,7 +106,7 @@ class HealthyUnits:
     def _relative(self, covariance: np.ndarray, faults: np.ndarray) -> np.ndarray:
         actuator, width, alpha_m = self.actuator, covariance.shape[2], self.spec["magnet_coefficient"]
         nominal, known = nominal_nine(actuator), Knowledge(**self.spec["known"]).covariance()
-        options = {"ambient_error": self.spec["ambient_error"], "alpha_m": alpha_m}
+        options = {"ambient_error": self.spec["ambient_error"], "alpha_m": alpha_m, "healthy_within": 0.0}
         if width == 9 and np.any(known):
             options["prior"] = nominal, known * np.outer(nominal, nominal)
         found = []
