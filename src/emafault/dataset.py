@@ -17,7 +17,7 @@ from .actuator.parameters import ActuatorParameters, make_runs
 from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
-from .filters import low_passed
+from .filters import low_passed, undone
 from .io.atomic import replace_atomically, write_text
 from .io.recording import PHASES, VARIABLES, Recording
 from .places import file_at
@@ -155,7 +155,9 @@ def simulate_and_measure(
     if low_pass and low_pass["before_noise"]:
         signals = low_passed(signals, interval, low_pass)
     out = measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
-    return low_passed(out, interval, low_pass) if low_pass and not low_pass["before_noise"] else out
+    if low_pass and not low_pass["before_noise"]:
+        out = low_passed(out, interval, low_pass)
+    return undone(out, interval, low_pass) if low_pass and low_pass["undone"] else out
 
 
 def _refuse_runaway(signals: Mapping[str, np.ndarray], actuator: Mapping[str, Any]) -> None:

@@ -116,6 +116,7 @@ class Filter:
     kind: str = choice(*FILTERS)
     cutoff: float = number(1.0, 1e5, "Hz")
     before_noise: bool = group()
+    undone: bool = group()
 
 
 @dataclass
