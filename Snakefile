@@ -19,6 +19,8 @@ include: "workflow/rules/gap.smk"
 include: "workflow/rules/fleet.smk"
 include: "workflow/rules/withheld.smk"
 include: "workflow/rules/evidence.smk"
+include: "workflow/rules/optimal_command.smk"
+include: "workflow/rules/several_recordings.smk"
 
 
 provenance.keep_known_sources()

@@ -68,6 +68,8 @@ def check_configuration(config: Mapping[str, Any]) -> None:
         if effect not in _calibrations():
             schema.refuse("unit.spread_of", effect, ", ".join(_calibrations()))
     recording = config["recording"]
+    if recording["filter"]["undone"] and recording["filter"]["kind"] == "moving_average":
+        schema.refuse("recording.filter.undone", True, "false of a moving average, which cannot be undone")
     intervals = recording["duration"] / recording["interval"]
     if abs(intervals - round(intervals)) > 1e-6:
         schema.refuse(

@@ -330,6 +330,8 @@ def dataset_spec(config: Mapping[str, Any], part: str) -> dict[str, Any]:
     for key in ("unlisted", "tolerances"):
         if config[key]:
             spec[key] = config[key]
+    if recording["filter"]["kind"] != "none":
+        spec["recording"]["filter"] = recording["filter"]
     if spec["command"]["name"] == "file":
         spec["command"]["digest"] = hashlib.sha256(Path(spec["command"]["path"]).read_bytes()).hexdigest()[:16]
     return recursively_sorted(spec)
@@ -347,6 +349,7 @@ def reconstruction_spec(config: Mapping[str, Any], method: str) -> dict[str, Any
 
 def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
     """What the Cramer-Rao bounds of the fresh rows read: all samples that any least-squares method uses."""
+    repeats = config["unit"]["reference_recordings"]
     methods = [entry for entry in config["reconstruction"].values() if entry["method"] != "paper"]
     spec = {
         "dataset": dataset_spec(config, "fresh"),
@@ -354,6 +357,9 @@ def bound_spec(config: Mapping[str, Any]) -> dict[str, Any]:
         "discard": min((entry["discard"] for entry in methods), default=config["recording"]["discard"]),
         "magnet_coefficient": magnet_coefficient(config),
         "known": known(config),
+        "heating": any(entry.get("heating", False) for entry in methods),
+        "reference": dataset_spec(config, "reference") if repeats else None,
+        "ambient_error": config["sensors"]["ambient"],
     }
     return recursively_sorted(spec)
 
@@ -416,7 +422,7 @@ def evaluation_spec(config: Mapping[str, Any]) -> dict[str, Any]:
 def _bound_beside(entry: Mapping[str, Any]) -> str:
     """Which bound an entry of the group reconstruction stands beside, see ``study.features.compute_bound``."""
     if entry["method"] == "nine":
-        return "recording"
+        return "heating" if entry["heating"] else "recording"
     return "plateau" if entry["method"] == "weighted" and not entry["floating"] else "floating"
 
 
@@ -623,6 +629,63 @@ def evidence_spec() -> dict[str, Any]:
     return recursively_sorted(_pick(compose(), "actuator", "sensors") | {"evidence": _evidence()})
 
 
+def _design() -> dict[str, Any]:
+    """The settings of conf/optimal_command.yaml.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    read = read_yaml(CONF / "optimal_command.yaml")
+    schema.check(read, schema.Design, "optimal_command")
+    if not read["lengths"]:
+        schema.refuse("optimal_command.lengths", read["lengths"], "a list of one length or more (s)")
+    for name, ends in read["space"].items():
+        if name not in schema.COMMANDS or name == "file":
+            raise InputError(schema.unknown_key(name, "optimal_command.space", schema.COMMANDS.keys() - {"file"}))
+        for end in ("low", "high"):
+            settings = {"name": name, **{key: float(value[end]) for key, value in ends.items()}}
+            schema.check(settings, schema.COMMANDS[name], f"optimal_command.space.{name}")
+    return read
+
+
+def design_lengths() -> list[float]:
+    """Lengths (s) of recording for which a command is searched."""
+    return _design()["lengths"]
+
+
+def design_spec() -> dict[str, Any]:
+    """What the search for the command that identifies best reads."""
+    design = _design()
+    config = compose(design["experiment"], ["reconstruction=[weighted_floating,nine]"])
+    spec = {
+        "design": design,
+        "dataset": dataset_spec(config, "fresh"),
+        "known": known(config),
+        "magnet_coefficient": magnet_coefficient(config),
+    }
+    return recursively_sorted(spec)
+
+
+def several_spec() -> dict[str, Any]:
+    """What identifying one fault from several recordings reads: conf/several_recordings.yaml and its experiments.
+
+    Raises
+    ------
+    InputError : naming the key, what it got and what it accepts
+    """
+    read = read_yaml(CONF / "several_recordings.yaml")
+    schema.check(read, schema.Several, "several_recordings")
+    if not read["counts"]:
+        schema.refuse("several_recordings.counts", read["counts"], "a list of one number or more")
+    own = []
+    for name in read.pop("experiments"):
+        config = compose(name)
+        parts = {"dataset": dataset_spec(config, "fresh"), "known": known(config), "name": name}
+        own.append(parts | {"alpha_m": magnet_coefficient(config), "question": config["question"]})
+    return recursively_sorted({"settings": read, "experiments": own})
+
+
 @dataclass(frozen=True)
 class Case:
     """One composed configuration and where its results stand.
@@ -678,6 +741,7 @@ def plan(experiment: str = "paper", overrides: str | Iterable[str] | None = None
     """
     check_draws()
     _evidence()
+    _design()
     texts = split_overrides(overrides)
     top = compose(experiment, texts)
     if top["variants"]:

@@ -17,6 +17,7 @@ from .actuator.parameters import ActuatorParameters, make_runs
 from .effects import EFFECTS
 from .errors import InputError
 from .faults import FAULT_NAMES, sample_faults
+from .filters import low_passed, undone
 from .io.atomic import replace_atomically, write_text
 from .io.recording import PHASES, VARIABLES, Recording
 from .places import file_at
@@ -137,7 +138,8 @@ def simulate_and_measure(
 
     Parameters
     ----------
-    spec : the sub-tree ``config.dataset_spec``: its ``sensors``, ``seed`` and, if any, ``unlisted`` are read
+    spec : the sub-tree ``config.dataset_spec``: its ``sensors``, ``seed`` and, if any, ``unlisted`` and the recording's
+        ``filter`` are read
     runs, command, duration, interval : as ``actuator.simulate`` takes them
     first_run : number of the first run, which its noise and whatever else is left to chance go by
     recording : name of the recording that is replayed, if any
@@ -149,7 +151,13 @@ def simulate_and_measure(
     unlisted, seed = spec.get("unlisted", ()), spec["seed"]
     terms = in_machine(unlisted, len(runs), seed, first_run, recording)
     signals = simulate(runs, command, duration, interval, terms=terms)
-    return measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
+    low_pass = spec["recording"].get("filter")
+    if low_pass and low_pass["before_noise"]:
+        signals = low_passed(signals, interval, low_pass)
+    out = measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
+    if low_pass and not low_pass["before_noise"]:
+        out = low_passed(out, interval, low_pass)
+    return undone(out, interval, low_pass) if low_pass and low_pass["undone"] else out
 
 
 def _refuse_runaway(signals: Mapping[str, np.ndarray], actuator: Mapping[str, Any]) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 from .actuator import grammar
 from .actuator.parameters import ECCENTRICITY_LAWS, ActuatorParameters
 from .errors import InputError, shown
+from .filters import FILTERS
 
 
 def number(low: float = -math.inf, high: float = math.inf, unit: str = "") -> Any:
@@ -111,11 +112,20 @@ class Load:
 
 
 @dataclass
+class Filter:
+    kind: str = choice(*FILTERS)
+    cutoff: float = number(1.0, 1e5, "Hz")
+    before_noise: bool = group()
+    undone: bool = group()
+
+
+@dataclass
 class RecordingConditions:
     duration: float = number(0.2, 3600.0, "s")
     discard: float = number(0.0, 3600.0, "s")
     interval: float = number(1e-5, 1e-2, "s")
     theta_0: AngleRange = group()
+    filter: Filter = group()
 
 
 @dataclass
@@ -206,6 +216,48 @@ class Evidence:
 
 
 @dataclass
+class DesignLimits:
+    speed: float = number(POSITIVE, 1e5, "rad/s")
+    travel: float = number(POSITIVE, 100.0, "rad")
+    supply: float = number(POSITIVE, 1.0, "of the bus voltage")
+    heating: float = number(POSITIVE, 500.0, "K")
+    heat_capacity: float = number(POSITIVE, 1e6, "J/K")
+
+
+@dataclass
+class Ends:
+    low: float = number()
+    high: float = number()
+
+
+@dataclass
+class LoadEnds:
+    constant: Ends = group()
+    spring: Ends = group()
+
+
+@dataclass
+class Design:
+    experiment: str = choice()
+    lengths: list[float] = number(0.2, 60.0, "s")
+    trials: int = number(2, 100_000)
+    seed: int = number(0, 2**31)
+    faults: int = number(1, 1000)
+    fresh: int = number(10, 1_000_000)
+    limits: DesignLimits = group()
+    load: LoadEnds = group()
+    space: dict[str, dict[str, Ends]] = group()
+
+
+@dataclass
+class Several:
+    experiments: list[str] = choice()
+    counts: list[int] = number(1, 64)
+    units: int = number(10, 1_000_000)
+    seed: int = number(0, 2**31)
+
+
+@dataclass
 class Tracking:
     uri: str = choice()
     experiment: str = choice()
@@ -252,6 +304,7 @@ RECONSTRUCTIONS: dict[str, type] = {
             ("plateau_width", float, number(30.0, 180.0, "electrical degrees")),
             ("zero_current", float, number(0.0, 10.0, "A")),
             ("noise", dict[str, float] | None, group()),
+            ("heating", bool, group()),
         ],
     ),
     "angle_resolved": make_dataclass(

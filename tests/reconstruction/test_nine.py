@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from emafault.actuator.commands import command_positions
-from emafault.actuator.parameters import make_runs
+from emafault.actuator.parameters import make_runs, set_effects
 from emafault.actuator.sensors import measure
 from emafault.actuator.simulate import simulate
 from emafault.closed_form import forward, inductance
@@ -166,3 +166,27 @@ def test_a_run_that_tells_nothing_is_nan_among_others():
     assert features.identified.tolist() == [False, True]
     with pytest.raises(InputError, match="not a setting of 'nine'"):
         reconstruct("nine", signals, 2e-4, ACTUATOR, {"margin": 2.0})
+
+
+def test_a_winding_that_warms_is_told_by_its_rate():
+    faults, runs, _ = recordings(60, "reversal", duration=0.5, seed=7)
+    runs = runs.copy()
+    set_effects(runs, {"self_heating": {"heating_rate": 0.333, "Rth": 5.0}})
+    command = command_positions("reversal", {"amplitude": 0.05, "speed": 0.6}, 0.5, ACTUATOR.control_period)
+    clean = simulate(runs, command, 0.5, 2e-4)
+    constant = reconstruct("nine", clean, 2e-4, ACTUATOR, {})
+    assert np.mean(constant.R / truth(faults)[:, :3] - 1.0) > 4e-3  # the winding's mean temperature
+    found = reconstruct("nine", clean, 2e-4, ACTUATOR, {"heating": True})
+    np.testing.assert_allclose(found.nine, truth(faults), rtol=1.5e-4)  # what is given off meanwhile is left out
+    measured = reconstruct("nine", measure(clean, runs, NOISE, 3), 2e-4, ACTUATOR, {"heating": True})
+    pull = (measured.nine - truth(faults)) / measured.nine_error
+    np.testing.assert_allclose(np.std(pull, axis=0), 1.0, atol=3.5 / np.sqrt(2 * 60))
+    assert np.max(np.abs(np.mean(pull, axis=0))) < 3.5 / np.sqrt(60)
+    assert measured.extras["fit"].mean() == pytest.approx(1.0, abs=0.1)
+    bound = nine_bound(clean, 2e-4, ACTUATOR, LEVELS, {"heating": True})
+    own = measured.extras["nine_covariance"]
+    np.testing.assert_allclose(np.mean(own, axis=0).diagonal(), np.mean(bound, axis=0).diagonal(), rtol=0.05)
+    # the rate costs R, and nothing else much
+    less = nine_bound(clean, 2e-4, ACTUATOR, LEVELS, {})
+    ratio = np.sqrt(np.mean(bound, axis=0).diagonal() / np.mean(less, axis=0).diagonal())
+    assert np.all(ratio[:3] > 1.3) and np.all(ratio[3:] < 1.1)

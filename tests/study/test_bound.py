@@ -5,8 +5,7 @@ import pytest
 
 from emafault import config
 from emafault.dataset import sample_runs
-from emafault.study.evaluation import read_bound
-from emafault.study.features import compute_bound
+from emafault.study.bound import compute_bound, read_bound
 
 FEW = ["sampling.fresh=12", "sampling.shards=1", "evaluation.bound_runs=12"]
 
@@ -32,3 +31,23 @@ def test_only_the_effects_asked_for_spread():
     records = sample_runs(spec).records(slice(None))
     assert np.std(records["inductance_tolerance_L_scale"]) == pytest.approx(0.03, rel=0.6)
     assert np.all(records["unit_calibration_R_scale"] == 1.0) and np.ptp(records["viscous_friction_scale"]) == 0.0
+
+
+def test_a_unit_that_is_calibrated_has_the_bound_of_both_recordings(tmp_path):
+    few = [text.replace("12", "10") for text in FEW]
+    means = {}
+    for given in ("reference_recordings=1", "reference_recordings=4"):
+        spec = config.bound_spec(config.compose("nine_tolerance", [*few, f"unit.{given}"]))
+        compute_bound(spec, tmp_path / "bound.nc")
+        means[given] = read_bound(tmp_path / "bound.nc")
+    one, four = means.values()
+    for name in ("floating", "recording"):
+        # six features that take their unit for nominal are bounded as if it were, so that calibration costs
+        alone, calibrated = one[name], one[f"{name}_calibrated"]
+        assert np.all(four[f"{name}_calibrated"] < calibrated)
+        if name == "recording":
+            assert calibrated[5] < 0.3 * alone[5] and np.all(calibrated[:3] < 0.2 * alone[:3])
+        else:
+            assert np.all(calibrated[:5] > 1.3 * alone[:5])
+        # the ambient temperature's own error stands behind that of a healthy recording
+        assert calibrated[5] > 0.5 > four[f"{name}_calibrated"][5]

@@ -69,6 +69,7 @@ def identify(
     level: float = 0.9,
     results: str | Path | None = None,
     actuator: str | Path | None = None,
+    together: bool = False,
 ) -> Identification:
     """Identify the fault vector of each recording, as ``emafault identify`` does.
 
@@ -81,6 +82,7 @@ def identify(
     level : of the intervals
     results : folder of results; None takes ``results`` here, else that of the project
     actuator : file of one's own actuator, for which the closed form needs no training; None takes the experiment's
+    together : the recordings are of one unit with one fault: N and xi from all of them, dT of each; by a closed form
 
     Raises
     ------
@@ -88,10 +90,11 @@ def identify(
     """
     given = recordings_of(recordings)
     healthy = [] if reference is None else list(recordings_of(reference).values())
-    model = load_model(experiment, method, results, None if actuator is None else str(actuator))
-    found = identify_recordings(model, list(given.values()), healthy, level)
+    model = load_model(experiment, method, results, None if actuator is None else str(actuator), together)
+    found = identify_recordings(model, list(given.values()), healthy, level, together)
     unit = f"calibrated on {len(healthy)} healthy recording(s)" if healthy else "taken for nominal (no reference)"
     how = f"experiment {experiment}, method {model.name}, unit {unit}"
+    how += f"; one fault of all {len(given)} recordings" if together else ""
     return Identification(list(given), found.estimates, found.notes, how, level)
 
 

@@ -20,7 +20,11 @@ from ..plain import read_json, read_yaml
 
 
 def load_model(
-    experiment: str, choice: str | None = None, results: str | Path | None = None, actuator: str | None = None
+    experiment: str,
+    choice: str | None = None,
+    results: str | Path | None = None,
+    actuator: str | None = None,
+    closed_form: bool = False,
 ) -> Model:
     """The estimator of an experiment.
 
@@ -30,6 +34,7 @@ def load_model(
     choice : ``reconstruction`` or ``reconstruction/estimator``; None takes the most accurate on fresh rows
     results : folder of results; None takes ``results`` here, else that of the project
     actuator : file of one's own actuator, for which only the closed form is had: it needs no training
+    closed_form : where nothing is chosen take the best closed form
 
     Raises
     ------
@@ -51,7 +56,7 @@ def load_model(
     saved = folder.glob("identifiers/*/*/history.json") if actuator is None else ()
     known = {f"{p.parent.parent.name}/{p.parent.name}" for p in saved}
     known |= {f"{name}/closed_form" for name in methods}
-    name = choice or _most_accurate(folder if actuator is None else None, config, known)
+    name = choice or _most_accurate(None if closed_form or actuator is not None else folder, config, known)
     if "/" not in name:
         name = next((f"{name}/{e}" for e in ("searched", "network") if f"{name}/{e}" in known), f"{name}/closed_form")
     if name not in known:
@@ -105,7 +110,7 @@ def _most_accurate(folder: Path | None, config: Mapping[str, Any], known: set[st
     path = folder / "evaluation" / "metrics.json" if folder is not None else None
     if path is None or not os.path.lexists(path):
         methods = list(config["reconstruction"])
-        best = next((name for name in ("nine", "weighted_floating") if name in methods), methods[-1])
+        best = next((name for name in ("nine_heating", "nine", "weighted_floating") if name in methods), methods[-1])
         return f"{best}/closed_form"
     errors = _errors(path, read_json(path))
     return min((name for name in errors if name in known), key=lambda name: errors[name])

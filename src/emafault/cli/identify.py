@@ -35,6 +35,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="VERDICT",
         help="diagnosis.json of their bench: the fault vectors with the effects taken out that it names and describes",
     )
+    parser.add_argument(
+        "--together",
+        action="store_true",
+        help="the recordings are of one unit with one fault: N and xi from all of them, the temperature of each",
+    )
     parser.add_argument("--level", type=float, default=0.9, help="of the intervals (0.9)")
     parser.add_argument("--force", action="store_true", help="replace the file of --json if it exists")
     parser.add_argument("--results", metavar="DIR", help="folder of results (results here, else the project's)")
@@ -62,7 +67,8 @@ def run(args: argparse.Namespace) -> None:
         Recordings(what, {str(path): read_recording(path) for path in files})
         for what, files in (("files", paths), ("--reference", healthy))
     )
-    found = identify(given, reference, args.experiment, args.method, args.level, args.results, args.actuator)
+    options = {"results": args.results, "actuator": args.actuator, "together": args.together}
+    found = identify(given, reference, args.experiment, args.method, args.level, **options)
     _tell(found, args)
 
 
@@ -76,7 +82,7 @@ def _of_diagnosis(args: argparse.Namespace, paths: list[Path]) -> None:
     from ..api.identification import of_diagnosis
     from ..errors import InputError
 
-    for option in ("reference", "method", "actuator"):
+    for option in ("reference", "method", "actuator", "together"):
         if getattr(args, option):
             raise InputError(f"--{option}: is that of the diagnosis where --diagnosis is given")
     _tell(of_diagnosis(args.diagnosis, paths, args.level), args)

@@ -66,7 +66,7 @@ def nine_forward(
     return np.concatenate([*forward(faults, actuator, alpha_m, dT_magnet), inductance(faults, actuator)], axis=-1)
 
 
-def _laws(x: np.ndarray, alpha: float, alpha_m: float) -> tuple[np.ndarray, np.ndarray]:
+def laws(x: np.ndarray, alpha: float, alpha_m: float) -> tuple[np.ndarray, np.ndarray]:
     """(run, 9) logarithms over nominal and their derivatives (run, 9, 7) at N, xi, dT, lag (run, 7)."""
     left = np.maximum(1.0 - x[:, :3], LEAST_SHARE)
     c = np.maximum(1.0 + alpha * x[:, 5], LEAST_SHARE)
@@ -113,7 +113,7 @@ def posterior(
     if free == 7:
         prior[6] = known.lag_deviation**-2
     for _ in range(STEPS):
-        value, J = _laws(x, actuator.copper_coefficient, alpha_m)
+        value, J = laws(x, actuator.copper_coefficient, alpha_m)
         J = J[:, :, :free]
         left, score = y - value, np.swapaxes(J, 1, 2) @ weight
         normal = score @ J + np.diag(prior)
@@ -122,7 +122,7 @@ def posterior(
         inverse_normal = np.linalg.inv(normal / (scale[:, :, None] * scale[:, None, :]))
         spread = inverse_normal / (scale[:, :, None] * scale[:, None, :])
         x[:, :free] += (spread @ pull[:, :, None])[:, :, 0]
-    value, _ = _laws(x, actuator.copper_coefficient, alpha_m)
+    value, _ = laws(x, actuator.copper_coefficient, alpha_m)
     left = y - value
     misfit = np.einsum("ni,nij,nj->n", left, weight, left)
     if free == 7:

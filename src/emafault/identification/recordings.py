@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from ..errors import InputError
+from ..faults import FAULT_NAMES
 from ..io.recording import PHASES, Recording
 from ..io.sensors import refuse_mistaken
 from ..reconstruction import Features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
 from .posterior import CHANCE
+from .together import together
 
 #: what a fault vector's components can be of any machine, a unit off nominal allowed for
 POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
@@ -42,13 +44,18 @@ class Identified:
 
 
 def identify_recordings(
-    model: Model, recordings: Sequence[Recording], reference: Sequence[Recording] = (), level: float = 0.9
+    model: Model,
+    recordings: Sequence[Recording],
+    reference: Sequence[Recording] = (),
+    level: float = 0.9,
+    as_one: bool = False,
 ) -> Identified:
     """Identify the fault vector of each recording.
 
     Parameters
     ----------
     reference : healthy recordings of the same unit, to calibrate it with; none takes the unit for nominal
+    as_one : the recordings are of one unit and one fault: N and xi from all of them, a temperature for each
 
     Raises
     ------
@@ -76,18 +83,76 @@ def identify_recordings(
         options = {"ambient_error": model.ambient_error, "alpha_m": identifier.alpha_m}
         found = calibrate(healthy, ambient, identifier.actuator, prior=identifier.prior, **options)
         unit, covariance = found.unit, found.covariance if np.all(np.isfinite(found.covariance)) else None
-    estimates, notes = [], []
+    estimates: list[dict[str, dict[str, float]]] = []
+    notes: list[list[str]] = []
+    told: list[np.ndarray | None] = []
     for recording, own in zip(recordings, features, strict=True):
         inputs, noise = own.inputs, own.inputs_covariance if np.all(np.isfinite(own.inputs_covariance)) else None
         noise, said = _with_misfit(recording.name, own, noise, identifier, unit, covariance)
-        estimates += identifier.estimate(inputs, level, noise, unit, covariance)
-        _refuse_impossible(recording.name, estimates[-1])
-        said += _beside_ambient(recording, estimates[-1], identifier)
+        if not as_one:
+            estimates += identifier.estimate(inputs, level, noise, unit, covariance)
+        told.append(noise)
         beyond = float(identifier.outside(inputs, unit)[0])
         if beyond > 0.05:
             said.append(f"features lie {beyond:.0%} of their range outside what was learnt from")
-        notes.append("; ".join(said))
-    return Identified(estimates, notes)
+        notes.append(said)
+    if as_one:
+        estimates = _as_one(model, recordings, features, told, unit, covariance, level)
+    for recording, estimate, said in zip(recordings, estimates, notes, strict=True):
+        _refuse_impossible(recording.name, estimate)
+        said[:0] = _beside_ambient(recording, estimate, identifier)
+    return Identified(estimates, ["; ".join(said) for said in notes])
+
+
+def _as_one(
+    model: Model,
+    recordings: Sequence[Recording],
+    features: Sequence[Features],
+    noise: Sequence[np.ndarray | None],
+    unit: np.ndarray | None,
+    unit_covariance: np.ndarray | None,
+    level: float,
+) -> list[dict[str, dict[str, float]]]:
+    """Estimates of recordings of one fault; N and xi are the same in each.
+
+    Raises
+    ------
+    InputError : a model that does not tell, recordings with a fault each of their own, or that fit no common fault
+    """
+    identifier = model.identifier
+    if identifier.network is not None or features[0].inputs.shape[1] == 8:
+        raise InputError(
+            f"--together: '{model.name}' cannot, accepted is a closed form of six or nine features, such as "
+            "weighted_floating/closed_form or nine/closed_form"
+        )
+    for recording, covariance in zip(recordings, noise):
+        if recording.health == "seeded" and len(recordings) > 1:
+            raise InputError(f"{recording.name}: has health 'seeded', a fault of its own; --together takes one fault")
+        if covariance is None:
+            raise InputError(f"--together: '{model.name}' tells no covariance, accepted is weighted or nine")
+    found = together(
+        np.concatenate([own.inputs for own in features]),
+        np.concatenate([covariance for covariance in noise if covariance is not None]),
+        identifier.actuator,
+        identifier.alpha_m,
+        identifier.known,
+        unit,
+        unit_covariance,
+    )
+    if len(recordings) > 1 and found.misfit > chi2.isf(CHANCE, found.freedom):
+        worst = recordings[int(np.argmax(found.shares))].name
+        raise InputError(
+            f"{worst}: fits no fault that the other recordings have too (chi-squared {found.misfit:.0f} of all with "
+            f"{found.freedom} degrees of freedom); without --together each is identified by itself"
+        )
+    half = norm.ppf(0.5 + 0.5 * level) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    return [
+        {
+            name: {"value": float(x[j]), "low": float(x[j] - h[j]), "high": float(x[j] + h[j])}
+            for j, name in enumerate(FAULT_NAMES)
+        }
+        for x, h in zip(found.faults, half)
+    ]
 
 
 def _with_misfit(

@@ -167,5 +167,6 @@ def nine_bound(
         record = read_record(data, run, actuator, s)
         if record is not None:
             beta = np.stack([truth.R[run], truth.k[run], truth.L[run], truth.offset[run]])
-            covariance[run] = nine_of(information(record, beta, levels))
+            rate = float(truth.extras["heating_rate"][run]) if s.heating else 0.0
+            covariance[run] = nine_of(information(record, beta, rate, levels))
     return covariance

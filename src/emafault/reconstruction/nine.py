@@ -15,6 +15,10 @@ of the residual, so that the estimate is unbiased by noise (Stefanski and Carrol
 block-tridiagonal: three phases share the noise of their currents, neighbouring intervals that of an end current. The
 sum of zero leaves each instant the noise covariance sigma^2 (I - 1 1'/m) among the m phases that conduct.
 
+A winding that warms in the record by its own losses has R_j (1 + w(t)) in the equation, with w = g Q and Q the integral
+of the currents squared from the start on: R_j is that at the start. What it gives off meanwhile is left out. With
+``heating`` the rate g, one for all phases, is an unknown; without, the mean R_j over the record is found.
+
 The angle turned comes from the recorded angles and speeds together. The noise that this leaves in the speed counts as
 white in Omega, where what is left out would bias L. It has no slow part, though, and k is told by slow parts alone: the
 estimate's covariance is that of the other noise.
@@ -29,7 +33,7 @@ from scipy.linalg import solveh_banded
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.shape import trapezoid_swept
 from ..closed_form import PHASE_AXIS
-from ..compiled import compiled
+from .factors import backward, factor, forward, project
 from .features import Features, Signals, check_number, read_settings
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
 from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise
@@ -42,7 +46,6 @@ FEWEST_FLOATING = 10  # samples of a phase, to tell its offset and the currents'
 CLEAR = np.deg2rad(0.2)  # electrical angle kept clear of the edges of the off sector, for the angle's noise
 STANDSTILL = 1e-3  # rad/s
 UNKNOWNS = 12  # R, k, L and c, three phases each
-NEGLIGIBLE = 1e-100  # what has died away is cut off, as denormal numbers slow everything after them down
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class NineSettings:
     plateau_width: float = 120.0  # electrical degrees
     zero_current: float = 0.2  # A, largest measured current that may count as zero
     noise: Mapping[str, float] | None = None  # voltage, current, current_end, speed (SI, 1 sigma); None estimates them
+    heating: bool = False  # the winding warms in the record
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ class Record:
     stretch: np.ndarray  # (row,) number of the stretch of rotor angle in which the row begins
     noise: NoiseLevels  # as the record tells it, the voltage's apart
     interval: float  # s
+    dissipated: np.ndarray | None = None  # (row,) A2 s, Q at the row's middle; None where R is constant
 
 
 @dataclass(frozen=True)
@@ -76,117 +81,11 @@ class NineFit:
     """Estimate of one run."""
 
     beta: np.ndarray  # (4, phase) R, k, L, c
+    rate: float  # 1/(A2 s), g
     covariance: np.ndarray  # (9, 9) of [R, k, L]
     chi2: np.ndarray  # (phase,) residual variance over the one expected
     fit: np.ndarray  # mean square of the stretches' standardised mean residuals, (phase,), 1 where the equation holds
     freedom: np.ndarray  # (phase,) its degrees of freedom
-
-
-@compiled
-def share(live, out):
-    """Fill ``out`` (3, 3) with I - 1 1'/m among the m live phases: covariance of currents that sum to zero."""
-    m = 0
-    for j in range(3):
-        if live[j]:
-            m += 1
-    for a in range(3):
-        for b in range(3):
-            both = live[a] and live[b]
-            out[a, b] = ((1.0 if a == b else 0.0) - 1.0 / m) if both else 0.0
-
-
-@compiled
-def factor(R, lever, slope, live, live_end, voltage, current, current_end, speed):
-    """Factors of the rows' noise covariance Omega = T T': diagonal blocks C (lower) and blocks G before them.
-
-    Parameters
-    ----------
-    R : (phase,) ohm; lever : (phase,) L/interval (ohm)
-    slope : (row, phase) change of the voltage with speed (V s/rad)
-    voltage, current, current_end, speed : 1 sigma (V, A, A, rad/s)
-    """
-    rows = len(live)
-    C, G = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
-    mean, start, stop = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    share(live_end[0], start)
-    for n in range(rows):
-        share(live[n], mean)
-        share(live_end[n + 1], stop)
-        c, g = C[n], G[n]
-        if n > 0:  # g = B C'^-1 with B the covariance of this row's phases with those of the row before
-            before = C[n - 1]
-            for a in range(3):
-                for b in range(3):
-                    x = -lever[a] * lever[b] * current_end**2 * start[a, b]
-                    for l in range(b):
-                        x -= g[a, l] * before[b, l]
-                    g[a, b] = x / before[b, b]
-        for a in range(3):
-            for b in range(a + 1):
-                x = R[a] * R[b] * current**2 * mean[a, b]
-                x += lever[a] * lever[b] * current_end**2 * (start[a, b] + stop[a, b])
-                x += slope[n, a] * slope[n, b] * speed**2
-                if a == b:
-                    x += voltage**2
-                for l in range(3):
-                    x -= g[a, l] * g[b, l]
-                for l in range(b):
-                    x -= c[a, l] * c[b, l]
-                c[a, b] = np.sqrt(x) if a == b else x / c[b, b]
-        start, stop = stop, start
-    return C, G
-
-
-@compiled
-def forward(C, G, table):
-    """T^-1 table, ``table`` (row, phase, column)."""
-    rows, _, columns = table.shape
-    out = np.empty((rows, 3, columns))
-    for n in range(rows):
-        for a in range(3):
-            for q in range(columns):
-                x = table[n, a, q]
-                if n > 0:
-                    for l in range(3):
-                        x -= G[n, a, l] * out[n - 1, l, q]
-                for l in range(a):
-                    x -= C[n, a, l] * out[n, l, q]
-                x /= C[n, a, a]
-                out[n, a, q] = x if abs(x) > NEGLIGIBLE else 0.0
-    return out
-
-
-@compiled
-def backward(C, G, table):
-    """T'^-1 table, ``table`` (row, phase)."""
-    rows = len(table)
-    out = np.empty((rows, 3))
-    for n in range(rows - 1, -1, -1):
-        for a in range(2, -1, -1):
-            x = table[n, a]
-            if n + 1 < rows:
-                for l in range(3):
-                    x -= G[n + 1, l, a] * out[n + 1, l]
-            for l in range(a + 1, 3):
-                x -= C[n, l, a] * out[n, l]
-            out[n, a] = x / C[n, a, a]
-    return out
-
-
-@compiled
-def project(values, live):
-    """(row, phase) values with the mean over the live phases taken off, zero where not live."""
-    out = np.zeros(values.shape)
-    for n in range(len(values)):
-        total, m = 0.0, 0
-        for j in range(3):
-            if live[n, j]:
-                total += values[n, j]
-                m += 1
-        for j in range(3):
-            if live[n, j]:
-                out[n, j] = values[n, j] - total / m
-    return out
 
 
 def angles_turned(speed: np.ndarray, angle: np.ndarray, interval: float) -> tuple[np.ndarray, float]:
@@ -249,9 +148,11 @@ def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: Nin
     emf, rate = np.diff(swept[first - 1 :], axis=0) / (p * h), np.diff(angle[first - 1 :])[:, None] / h
     moving = np.abs(rate) > STANDSTILL
     mean, at_end = (float(np.sqrt(np.mean(s))) for s in scatter)
+    i = project(i, ~floating)
+    losses = h * np.sum(i**2, axis=1)
     return Record(
         V=signals.voltage[run, part],
-        i=project(i[part], ~floating[part]),
+        i=i[part],
         end=project(end[first - 1 :], ~still[first - 1 :]),
         emf=emf,
         f=np.where(moving, emf / np.where(moving, rate, 1.0), 0.0),
@@ -260,28 +161,38 @@ def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: Nin
         stretch=np.floor(p * angle[first - 1 : -1] / STRETCH).astype(np.int64),
         noise=NoiseLevels(USUAL_VOLTAGE, mean, at_end, rate_noise),
         interval=h,
+        dissipated=(np.cumsum(losses) - 0.5 * losses)[part] if s.heating else None,
     )
 
 
-def regressors(r: Record, i: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(row, phase, 12) derivatives of the voltages by [R, k, L, c] of phases a, b, c."""
-    X = np.zeros((*r.V.shape, UNKNOWNS))
+def warmth(r: Record, rate: float) -> np.ndarray | float:
+    """(row, 1) R over that at the start, 1 where it is constant."""
+    return 1.0 if r.dissipated is None else 1.0 + rate * r.dissipated[:, None]
+
+
+def regressors(r: Record, i: np.ndarray, end: np.ndarray, R: np.ndarray, rate: float) -> np.ndarray:
+    """(row, phase, 12) derivatives of the voltages by [R, k, L, c] of phases a, b, c; a last one by the rate."""
+    X = np.zeros((*r.V.shape, UNKNOWNS + (r.dissipated is not None)))
+    if r.dissipated is not None:
+        X[:, :, UNKNOWNS] = R * i * r.dissipated[:, None]
+    warm = warmth(r, rate) * i
     for j in range(3):
-        X[:, j, 3 * CURRENT + j], X[:, j, 3 * EMF + j] = i[:, j], r.emf[:, j]
+        X[:, j, 3 * CURRENT + j], X[:, j, 3 * EMF + j] = warm[:, j], r.emf[:, j]
         X[:, j, 3 * DIDT + j], X[:, j, 3 * INTERCEPT + j] = np.diff(end[:, j]) / r.interval, r.live[:, j]
     return X
 
 
-def residuals(r: Record, beta: np.ndarray) -> np.ndarray:
+def residuals(r: Record, beta: np.ndarray, rate: float) -> np.ndarray:
     """(row, phase) recorded less predicted voltage (V); ``beta`` (4, phase) R, k, L, c."""
     R, k, L, c = beta
-    return r.V - R * r.i - k * r.emf - L * np.diff(r.end, axis=0) / r.interval - c * r.live
+    return r.V - warmth(r, rate) * R * r.i - k * r.emf - L * np.diff(r.end, axis=0) / r.interval - c * r.live
 
 
-def information(r: Record, beta: np.ndarray, noise: NoiseLevels) -> np.ndarray:
-    """(12, 12) Fisher information of [R, k, L, c] where ``r`` holds true currents and speeds."""
+def information(r: Record, beta: np.ndarray, rate: float, noise: NoiseLevels) -> np.ndarray:
+    """(12, 12) Fisher information of [R, k, L, c], or (13, 13) with the rate; ``r`` holds true currents and speeds."""
     C, G = _factor(r, beta, replace(noise, speed=0.0))
-    W = forward(C, G, regressors(r, r.i, r.end)).reshape(-1, UNKNOWNS)
+    X = regressors(r, r.i, r.end, beta[CURRENT], rate)
+    W = forward(C, G, X).reshape(-1, X.shape[2])
     return W.T @ W
 
 
@@ -292,12 +203,12 @@ def _factor(r: Record, beta: np.ndarray, noise: NoiseLevels) -> tuple[np.ndarray
 
 
 def nine_of(normal: np.ndarray) -> np.ndarray:
-    """(9, 9) covariance of [R, k, L] from the information of all twelve."""
+    """(9, 9) covariance of [R, k, L] from the information of all unknowns."""
     scale = np.sqrt(np.diagonal(normal))
     return (np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale))[:9, :9]
 
 
-def _voltage_noise(r: Record, beta: np.ndarray, noise: NoiseLevels) -> float:
+def _voltage_noise(r: Record, beta: np.ndarray, rate: float, noise: NoiseLevels) -> float:
     """Voltage noise (V) that the residuals at ``beta`` leave once that of currents and speed is taken off."""
     m = np.maximum(np.sum(r.live, axis=1, keepdims=True), 1)
     m_end = np.maximum(np.sum(r.live_end, axis=1, keepdims=True), 1)
@@ -305,7 +216,7 @@ def _voltage_noise(r: Record, beta: np.ndarray, noise: NoiseLevels) -> float:
     known = (beta[CURRENT] * noise.current) ** 2 * r.live * (1.0 - 1.0 / m)
     known = known + (beta[EMF] * r.f * noise.speed) ** 2
     known = known + (beta[DIDT] / r.interval * noise.current_end) ** 2 * (of_end[1:] + of_end[:-1])
-    left = float(np.mean(residuals(r, beta) ** 2 - known))
+    left = float(np.mean(residuals(r, beta, rate) ** 2 - known))
     return float(np.sqrt(max(left, LEAST_VOLTAGE**2)))
 
 
@@ -315,12 +226,12 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
     beta[CURRENT], beta[EMF], beta[DIDT] = actuator.resistance, actuator.back_emf, actuator.inductance
     # the noise of the smoothed speed is told by the record in any case
     noise = r.noise if stated is None else replace(stated, speed=r.noise.speed)
-    i, end = r.i, r.end
+    i, end, rate = r.i, r.end, 0.0
     for turn in range(1 + PASSES):
         if turn and stated is None:
-            noise = replace(noise, voltage=_voltage_noise(r, beta, noise))
+            noise = replace(noise, voltage=_voltage_noise(r, beta, rate, noise))
         C, G = _factor(r, beta, noise)
-        left = residuals(r, beta)
+        left = residuals(r, beta, rate)
         white = forward(C, G, left[..., None])[..., 0]
         if turn:
             u = backward(C, G, white)
@@ -331,14 +242,17 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
             moved[1:] += beta[DIDT] / r.interval * u
             moved[:-1] -= beta[DIDT] / r.interval * u
             end = r.end + quiet * noise.current_end**2 * project(moved, r.live_end)
-        W = forward(C, G, regressors(r, i, end)).reshape(-1, UNKNOWNS)
+        X = regressors(r, i, end, beta[CURRENT], rate)
+        W = forward(C, G, X).reshape(-1, X.shape[2])
         normal = W.T @ W
         if is_singular(normal):
             return None
-        beta = beta + np.linalg.solve(normal, W.T @ white.ravel()).reshape(4, 3)
+        step = np.linalg.solve(normal, W.T @ white.ravel())
+        beta = beta + step[:UNKNOWNS].reshape(4, 3)
+        rate += float(np.sum(step[UNKNOWNS:]))
     fit, freedom = _by_stretch(r.stretch, white)
-    covariance = nine_of(information(replace(r, i=i, end=end), beta, noise))
-    return NineFit(beta, covariance, np.mean(white**2, axis=0), fit, freedom)
+    covariance = nine_of(information(replace(r, i=i, end=end), beta, rate, noise))
+    return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, freedom)
 
 
 def _by_stretch(stretch: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -355,7 +269,8 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
 
     ``extras``: ``nine_covariance`` (run, 9, 9) of [R, k, L] (SI); ``chi2`` (run, phase) residual variance over the one
     expected from the noise levels; ``fit`` (run, phase) mean square of the standardised mean residuals of 15 electrical
-    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise. Without end
+    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise; with
+    ``heating`` also ``heating_rate`` (run,) in 1/(A2 s), relative growth of R. Without end
     currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, with L_j nominal
     to 30 %, and ``fit`` is NaN.
 
@@ -371,6 +286,9 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
     nine, chi2, fit = np.full((runs, 9, 9), np.nan), np.full((runs, 3), np.nan), np.full((runs, 3), np.nan)
     freedom = np.zeros((runs, 3), np.int64)
     told = {"chi2": chi2, "fit": fit, "freedom": freedom, "nine_covariance": nine}
+    rate = np.full(runs, np.nan)
+    if s.heating:
+        told["heating_rate"] = rate
     if signals.current_end is None:
         plain = WeightedSettings(s.discard, 2.0, s.plateau_width, True, s.zero_current, s.noise)
         found, fits = fit_runs(signals, actuator, plain, lambda rows: rows.f[:, None])
@@ -388,6 +306,6 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
         estimate = None if record is None else fit_record(record, actuator, stated)
         if estimate is not None:
             beta[:, run], nine[run], chi2[run] = estimate.beta, estimate.covariance, estimate.chi2
-            fit[run], freedom[run] = estimate.fit, estimate.freedom
+            fit[run], freedom[run], rate[run] = estimate.fit, estimate.freedom, estimate.rate
     R, k, L, offset = beta
     return Features(R, k, L, offset, nine[:, :6, :6].copy(), told)

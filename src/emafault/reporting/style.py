@@ -17,6 +17,7 @@ COLOURS = {
     "weighted_floating": "#2a9d8f",
     "angle_resolved": "#7b5ea7",
     "nine": "#c2185b",
+    "nine_heating": "#e39a2d",
 }
 PHASE_COLOURS = ("#d1495b", "#2e86ab", "#3d9970")
 GREY = "#8a8a8a"

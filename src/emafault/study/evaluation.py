@@ -1,37 +1,25 @@
 """Evaluation of every trained estimator on fresh rows: metrics in physical units beside the bound; the estimates."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..identification.evaluation import GROUPS, FeatureSet, evaluate, over_seeds
 from ..identification.identifier import Identifier
 from ..io.atomic import replace_atomically
 from ..plain import read_json
 from ..reconstruction.calibration import calibrate
+from .bound import CALIBRATED, read_bound
 from .features import FeatureTable, read_features
 from .networks import HISTORY, folders, seed_folder, width_of, write_json
 
-BOUNDS = ("plateau", "floating", "recording")
 FEW = 10  # rows of the paper's external validation
 _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
-
-
-def read_bound(path: str | Path) -> dict[str, np.ndarray | None]:
-    """Each bound of ``features.compute_bound`` -> (6,) standard deviation averaged over runs, None where none holds."""
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="netcdf4") as data:
-            means = {name: np.mean(data[name].values, axis=0) for name in BOUNDS}
-    except (OSError, KeyError) as error:
-        raise InputError(f"{path}: not a readable bound ({error})") from error
-    return {name: mean if np.all(np.isfinite(mean)) else None for name, mean in means.items()}
 
 
 def healthy_units(
@@ -72,7 +60,7 @@ def evaluate_identification(
     ----------
     histories : ``.../identifiers/<method>/<estimator>/history.json`` of every estimator
     fresh, references : feature tables ``<part>_<method>.nc``; references are empty unless units are calibrated
-    bound_file : what ``features.compute_bound`` wrote
+    bound_file : what ``bound.compute_bound`` wrote
     spec : the sub-tree ``config.evaluation_spec``
     metrics, estimates : files to write; estimates are those of each estimator's first seed
     """
@@ -98,13 +86,13 @@ def evaluate_identification(
         }
         calibrations: dict[str, tuple] = {"": (None, None)}
         if method in units:
-            calibrations["_calibrated"] = healthy_units(units[method], len(table.faults), spec, models[0].prior)
+            calibrations[CALIBRATED] = healthy_units(units[method], len(table.faults), spec, models[0].prior)
         for name, (unit, covariance) in calibrations.items():
             known = np.all(np.isfinite(data.features), axis=1)
             if unit is not None:
                 known &= np.all(np.isfinite(unit), axis=1)
                 unit, covariance = unit[known], _none_if_unknown(covariance[known])
-            rows = data.rows(known)
+            rows = replace(data, bound=bounds.get(spec["bounds"][method] + name)).rows(known)
             every = [evaluate(model, rows, width, spec["level"], unit, covariance) for model in models]
             entry[f"all{name}"] = over_seeds(every)
             entry[f"few{name}"] = over_seeds(

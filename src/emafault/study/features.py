@@ -1,4 +1,4 @@
-"""Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file; their Cramer-Rao bound."""
+"""Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..dataset import BLOCK, count_runs, read_blocks, sample_runs
+from ..dataset import BLOCK, count_runs, read_blocks
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
@@ -197,68 +197,3 @@ def read_features(path: str | Path) -> FeatureTable:
             return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
     except (OSError, KeyError, ValueError) as error:
         raise InputError(f"{path}: not a readable table of features ({error})") from error
-
-
-def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
-    """Cramer-Rao standard deviations of the first fresh runs' faults.
-
-    ``plateau`` and ``floating`` are those of six features, from plateau samples and with floating ones too;
-    ``recording`` is that of all intervals of the recording with L among the coefficients, and with what is known of R0,
-    k0, L0 and the magnets' lag beforehand. They are NaN where the bounds do not hold: without noise, and under the
-    rotor-angle laws, whose R, k carry no xi.
-
-    Parameters
-    ----------
-    spec : the sub-tree ``config.bound_spec``
-
-    Raises
-    ------
-    InputError : the file cannot be written
-    """
-    import xarray as xr
-
-    from ..actuator.commands import command_positions
-    from ..actuator.simulate import simulate
-    from ..actuator.unlisted import in_machine
-    from ..identification.posterior import Knowledge, nine_forward, posterior
-    from ..reconstruction.bounds import cramer_rao_bound, nine_bound
-
-    part = spec["dataset"]
-    recording, settings = part["recording"], dict(part["command"])
-    settings.pop("digest", None)
-    command = command_positions(
-        settings.pop("name"), settings, recording["duration"], part["actuator"]["control_period"]
-    )
-    sample = sample_runs(part)
-    runs, faults = sample.records(slice(spec["runs"])), sample.faults[: spec["runs"]]
-    actuator, known = ActuatorParameters(**part["actuator"]), Knowledge(**spec["known"])
-    alpha_m = spec["magnet_coefficient"]
-    found: dict[str, list[np.ndarray]] = {"plateau": [], "floating": [], "recording": []}
-    holds = part["sensors"]["voltage"] > 0.0 and part["faults"]["law"] == "stator_fixed"
-    for start in progress(range(0, len(runs), BLOCK), "bound", -(-len(runs) // BLOCK)):
-        if not holds:
-            for parts in found.values():
-                parts.append(np.full((len(runs[start : start + BLOCK]), 6), np.nan))
-            continue
-        some = runs[start : start + BLOCK]
-        terms = in_machine(part.get("unlisted", ()), len(some), part["seed"], start)
-        interval, noise = recording["interval"], part["sensors"]
-        clean = simulate(some, command, recording["duration"], interval, terms=terms)
-        for name in ("plateau", "floating"):
-            choice = {"discard": spec["discard"], "floating": name == "floating"}
-            bound = cramer_rao_bound(clean, interval, actuator, noise, choice, alpha_m)
-            found[name].append(bound.standard_error)
-        nine = nine_bound(clean, interval, actuator, noise, {"discard": spec["discard"]})
-        rows = slice(start, start + len(nine))
-        true = nine_forward(faults[rows], actuator, alpha_m, sample.dT_magnet[rows])
-        least = posterior(
-            true, nine + known.covariance() * true[:, :, None] * true[:, None, :], actuator, alpha_m, known
-        )
-        found["recording"].append(np.sqrt(np.diagonal(least.covariance, axis1=1, axis2=2)))
-    data = xr.Dataset(
-        {name: (("run", "component"), np.concatenate(parts)) for name, parts in found.items()}
-        | {"fault": (("run", "component"), faults)},
-        {"component": list(FAULT_NAMES)},
-        {"title": "Cramer-Rao standard deviation of each fault", "Conventions": "CF-1.11"},
-    )
-    replace_atomically(Path(output), lambda temporary: data.to_netcdf(temporary, engine="netcdf4"))

@@ -14,6 +14,7 @@ from ..reporting import paper as paper_figures
 from ..reporting import search as search_figures
 from ..reporting.page import Page
 from ..reporting.style import named
+from .bound import CALIBRATED
 from .networks import folders
 
 #: what the paper reports on ten fresh rows
@@ -22,7 +23,9 @@ BOUND_OF = {
     "plateau": "six features of plateau samples",
     "floating": "six features with floating-phase samples",
     "recording": "all intervals of the recordings",
+    "heating": "all intervals of the recordings, the winding warming at an unknown rate",
 }
+WHOLE = ("recording", "heating")  # bounds of recordings rather than of features
 OUTPUTS = {"N": ("N", 1.0, 5), "xi": ("ξ", 1.0, 5), "dT": ("ΔT (K)", 1.0, 3)}
 WORSE = 1.2  # times the error over its bound, from which a shift is told
 MOVED = " ▲"
@@ -130,11 +133,11 @@ def _finding(table: Mapping[str, Any]) -> str:
     )
     bound = _bound_of(table, best)
     if bound:
-        of_what = "recordings" if best["bound"] == "recording" else "features"
+        of_what = "recordings" if best["bound"] in WHOLE else "features"
         text += f"; the Cramér-Rao bound of these {of_what} is {_in_words(bound)}"
-    other = table["bound"]["floating" if best["bound"] == "recording" else "recording"]
+    other = table["bound"]["floating" if best["bound"] in WHOLE else "recording"]
     if bound and other:
-        of_what = "six features" if best["bound"] == "recording" else "the recordings themselves"
+        of_what = "six features" if best["bound"] in WHOLE else "the recordings themselves"
         text += f", that of {of_what} {_in_words(other)}"
     text += ". "
     own = next((r for r in results if r["method"] == "paper" and r["estimator"] == "network"), None)
@@ -150,8 +153,10 @@ def _finding(table: Mapping[str, Any]) -> str:
         text += (
             "The units evaluated differ within their specification. Calibrated on healthy recordings of each, "
             f"{named(best['method'], best['estimator'])} errs by {_value(calibrated, 'errors.dT.mae'):.3g} K, "
-            f"{_value(calibrated, 'errors.N.mae'):.2g} and {_value(calibrated, 'errors.xi.mae'):.2g}."
+            f"{_value(calibrated, 'errors.N.mae'):.2g} and {_value(calibrated, 'errors.xi.mae'):.2g}"
         )
+        bound = table["bound"].get(best["bound"] + CALIBRATED)
+        text += f"; the bound of both recordings is {_in_words(bound)}." if bound else "."
     return text
 
 
@@ -207,7 +212,8 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
             errors[(entry["method"], entry["estimator"] + suffix)] = found[f"{key}.value"] - found[f"{key}.truth"]
     for name, bound in table["bound"].items():
         if bound:
-            row = [f"Cramér-Rao bound, {BOUND_OF[name]}", ""]
+            suffix = ", calibrated" if name.endswith(CALIBRATED) else ""
+            row = [f"Cramér-Rao bound, {BOUND_OF[name.removesuffix(CALIBRATED)]}{suffix}", ""]
             for output, (_, _, digits) in OUTPUTS.items():
                 row += [f"{bound[output]:.{digits}f}", "1"]
             rows.append([*row, "", ""])
@@ -215,8 +221,9 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
     page.table(header, rows, strong)
     text = (
         "Mean absolute errors on fresh rows; ± is the standard deviation over seeds. Rows named weighted use plateau "
-        "samples and stand beside that bound, those named nine beside the recordings' own, all others beside the bound "
-        "with floating-phase samples. The bounds of six features come from the voltage-current-speed equations with R, "
+        "samples and stand beside that bound, those named nine beside the recordings' own, nine heating beside that of "
+        "a winding that warms at an unknown rate, all others beside the bound with floating-phase samples. The bounds "
+        "of six features come from the voltage-current-speed equations with R, "
         "k, L and offset of each phase free; the magnets' lag behind the winding and the healthy unit's R and k count "
         "as known to them. That of the recordings comes from all intervals, with L a coefficient of the fault and what "
         "is known beforehand of R, k, L and the lag as the configuration says (unit.known, magnet.lag)."
