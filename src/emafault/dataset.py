@@ -151,7 +151,7 @@ def simulate_and_measure(
     unlisted, seed = spec.get("unlisted", ()), spec["seed"]
     terms = in_machine(unlisted, len(runs), seed, first_run, recording)
     signals = simulate(runs, command, duration, interval, terms=terms)
-    low_pass = spec["recording"].get("filter")
+    low_pass = spec.get("recording", {}).get("filter")
     if low_pass and low_pass["before_noise"]:
         signals = low_passed(signals, interval, low_pass)
     out = measure(signals, runs, SensorNoise(**spec["sensors"]), seed, first_run, unlisted, interval, recording)
