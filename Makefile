@@ -18,7 +18,7 @@ study: .venv/ready
 	snakemake --cores $(CORES) --config experiment=$(experiment) "overrides=$(overrides)"
 
 test: .venv/ready
-	python -m pytest
+	python -m pytest -n logical --maxprocesses 4
 
 .venv/ready: requirements.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, PYTHON=... names one") if sys.version_info < (3, 11) else None'

@@ -208,7 +208,7 @@ class Evaluation:
 
 @dataclass
 class Evidence:
-    draws: int = number(20, 100_000)
+    draws: int = number(2, 100_000)
     samples: int = number(19, 9_999)
     seed: int = number(0, 2**31)
     benches: list[int] = number(0, 2**31)
