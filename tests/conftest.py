@@ -1,4 +1,4 @@
-"""The order of the tests: those that run the workflow take longest and come first, so that no process is left with them."""
+"""The order of the tests: those that run the workflow take longest and come first, so that none is left at the end."""
 
 
 def pytest_collection_modifyitems(items):
