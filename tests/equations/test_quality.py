@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from emafault.equations.quality import seen, told
 
@@ -28,3 +29,15 @@ def test_samples_that_repeat_within_the_range_are_held():
     current[rows] = current[rows - 1]
     channel = seen(replace(plain, phase_current=current))["phase_current"]
     assert channel.held > 0.0 and channel.clipped == 0.0
+
+
+@pytest.mark.parametrize("late", [0.0, 0.5, 1.0])
+def test_commutations_that_a_channels_gain_or_lag_shows_in_the_sum_are_no_spikes(late):
+    plain = recorded("reversal")
+    current = plain.phase_current * [1.08, 1.0, 1.0]
+    at = np.arange(len(current))
+    current[:, 0] = np.interp(at - late, at, current[:, 0])
+    assert seen(replace(plain, phase_current=current))["phase_current"].spikes == 0.0
+    rows = np.random.default_rng(2).choice(np.arange(2, len(current) - 2, 4), 30, replace=False)
+    current[rows, 0] += 5.0
+    assert seen(replace(plain, phase_current=current))["phase_current"].spikes == 30 / len(current)

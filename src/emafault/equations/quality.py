@@ -66,7 +66,7 @@ def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
     if step > 0.0:  # which repeats samples, and stands out, by itself
         return Channel(noise, step, 0.0, 0.0, clipped, level)
     held = max(_repeated(x) for x in values.T)
-    rate = len(spikes(together)) / len(values) if summed and not held else 0.0
+    rate = len(spikes(values)) / len(values) if summed and not held else 0.0
     return Channel(noise, 0.0, held, rate, clipped, level)
 
 

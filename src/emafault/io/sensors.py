@@ -246,20 +246,35 @@ def cut_off(recording: Recording) -> dict[str, np.ndarray]:
     return out
 
 
-def spikes(x: np.ndarray) -> np.ndarray:
-    """(spike,) samples of a signal (sample,) that stand out of both their neighbours; none where there are few."""
-    bend = np.zeros(len(x))
-    bend[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
-    size = np.abs(bend)
+def spikes(values: np.ndarray) -> np.ndarray:
+    """(spike,) samples at which the sum of channels (sample, channel) stands out of both its neighbours, which are
+    alike, as one of the channels does; none where there are few. What a gain or a lag of a channel leaves of the motion
+    in the sum is none: there the channel does more, or nothing, or the next sample does the opposite."""
+    together = values.sum(axis=1)
+    size = np.zeros(len(values))
+    size[1:-1] = np.abs(together[1:-1] - 0.5 * (together[:-2] + together[2:]))
     scale = float(np.median(size[1:-1])) / 0.6745
-    out = np.flatnonzero((size > SPIKE * scale) & (size >= np.roll(size, 1)) & (size >= np.roll(size, -1)))
+    summed = _standing_out(together[:, None])
+    half = 0.5 * np.abs(summed[:, 0])
+    alone = np.abs(summed - _standing_out(values)).min(axis=1) < half
+    alone &= np.abs(np.roll(together, 1) - np.roll(together, -1)) < half
+    out = np.flatnonzero((size > SPIKE * scale) & (size >= np.roll(size, 1)) & (size >= np.roll(size, -1)) & alone)
     return out if scale > 0.0 and len(out) >= FEWEST_SPIKES else out[:0]
+
+
+def _standing_out(values: np.ndarray) -> np.ndarray:
+    """(sample, channel) by how much at least samples lie above both their neighbours or, negative, below."""
+    out = np.zeros(values.shape)
+    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    less = np.minimum(np.abs(before), np.abs(after))
+    out[1:-1] = np.where(before * after > 0.0, np.sign(before) * less, 0.0)
+    return out
 
 
 def without_spikes(current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Phase currents (sample, phase) less their spikes, which are told from the motion by the sum of the phases: with
     the mean of both neighbours there; and (spike,) the samples."""
-    rows = spikes(current.sum(axis=1))
+    rows = spikes(current)
     mean = 0.5 * (current[rows - 1] + current[rows + 1])
     phase = np.argmax(np.abs(current[rows] - mean), axis=1)
     out = current.copy()
