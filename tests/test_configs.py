@@ -229,7 +229,7 @@ def test_every_so_many_cases_of_a_draw_are_told():
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ({"draws": 5}, r"evidence.draws: got 5, accepted is an integer from 20"),
+        ({"draws": 1}, r"evidence.draws: got 1, accepted is an integer from 2"),
         ({"samples": 100}, r"evidence.samples: got 100, accepted is one less than a multiple of 20"),
         ({"benches": [-1]}, r"evidence.benches\[0\]: got -1"),
         ({"benches": []}, r"evidence.benches: got \[\]"),
