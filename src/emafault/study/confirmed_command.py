@@ -163,7 +163,7 @@ def _is_loaded(design: Mapping[str, Any]) -> bool:
 def _row(entry: Mapping[str, Any]) -> list[str]:
     row = [f"{entry['design']['length']:g}", ROLES[entry["role"]], in_words(entry["design"])]
     if "errors" not in entry:
-        return [*row, f"breaks the limit of {', '.join(entry['breaches'])}", *[""] * 6]
+        return [*row[:-1], f"{row[-1]}; breaks the limit of {', '.join(entry['breaches'])}", *[""] * 7]
     for name, digits in {"N": 5, "xi": 5, "dT": 3}.items():
         error = entry["errors"][name]
         row += [f"{error:.{digits}f}", f"{error / entry['bound'][name]:.2f}"]
