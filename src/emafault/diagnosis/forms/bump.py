@@ -14,6 +14,7 @@ COEFFICIENTS = ("depth",)
 CELLS = 36  # of the turn
 EDGE = 2.0 * np.pi / CELLS
 WIDTHS = (0.1, 0.2, 0.4, 0.7)  # rad
+WIDEST = 1.0  # rad, standard deviation: what is wider is about no one angle, and beside a constant a wave
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
@@ -42,7 +43,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     centre, width = shape["centre"], shape["width"]
     reach, ratio = EDGE, 2.0
     for _ in range(3):
-        tried = [(centre + reach * x, width * ratio**y) for x in np.linspace(-1, 1, 5) for y in (-1.0, 0.0, 1.0)]
+        widths = [min(width * ratio**y, WIDEST) for y in (-1.0, 0.0, 1.0)]
+        tried = [(centre + reach * x, w) for x in np.linspace(-1, 1, 5) for w in widths]
 
         def of(b, tried=tried):
             angle = b.coordinates["rotor_angle"]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..left import Found, Left, Shape, gain
+from ..left import Found, Left, Shape, beside_first, gain
 from .spectrum import above, refined
 
 AXIS = "phase of the wave (rad)"  # of its picture
@@ -25,7 +25,8 @@ def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
-    """The order of the highest line of the spectrum along the angle, of all recordings together."""
+    """The order of the line that stands out most of the spectrum along the angle, of all recordings together, or of
+    the highest at a whole number if that explains more: low ones stand beside the motion's own."""
     if "angle" not in left.blocks[0].coordinates:
         return None
     first, turns = _span(left)
@@ -41,8 +42,9 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     ratio = above(power, 2 * int(AROUND * size / len(cells)) + 1)
     highest = min(HIGHEST, *(b.coordinates.get("highest_order", HIGHEST) for b in left.blocks))
     ratio[(orders < 2.0 / turns) | (orders > highest)] = 0.0
-    shape = {"order": float(orders[int(np.argmax(ratio))])}
-    return shape, _value(left, driver, shape)
+    whole = np.arange(1.0, np.floor(highest) + 1.0)
+    tried = [float(orders[int(np.argmax(ratio))]), float(max(whole, key=lambda n: power[round(n * size / CELLS)]))]
+    return max((({"order": n}, _value(left, driver, {"order": n})) for n in tried), key=lambda x: x[1])
 
 
 def _span(left: Left) -> tuple[float, float]:
@@ -53,7 +55,12 @@ def _span(left: Left) -> tuple[float, float]:
 
 
 def _value(left: Left, driver: int, shape: Shape) -> float:
-    return gain(*left.products(lambda b: columns(b.coordinates, shape), driver))
+    """What a wave explains beside a constant: over a few turns its mean is not zero."""
+
+    def beside_constant(b):
+        return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, shape)])
+
+    return gain(*beside_first(*left.products(beside_constant, driver)))
 
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
