@@ -174,8 +174,14 @@ def main() -> None:
             bench = Path(scratch) / name
             bench.mkdir()
             samples = simulate_bench(bench, case)
-            command = [sys.executable, "-c", "from emafault.cli import main; main()", "diagnose", str(bench)]
-            command += ["--out", str(Path(scratch) / "out")]
+            command = [
+                sys.executable,
+                "-c",
+                "import sys; from emafault.cli import main; sys.exit(main())",
+                "diagnose",
+                str(bench),
+            ]
+            command += ["--out", str(Path(scratch) / f"out_{name}")]
             if n == 0:
                 watch(command, environment, scratch)  # compiles
             found = [watch(command, environment, scratch) for _ in range(options.repeats)]

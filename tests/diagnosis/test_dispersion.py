@@ -59,3 +59,14 @@ def test_what_comes_and_goes_along_a_unit_disperses_its_score():
     """100 rows of variance 1 have a score of variance 100, to which a burst adds its square times 100^2."""
     found = overdispersion(*fitted(0.5), "drag")
     assert found == pytest.approx(1.0 + 0.25 * 100.0, rel=0.5)
+
+
+def test_a_set_without_a_unit_that_the_point_has_leaves_what_the_unit_adds():
+    """The same score, whether the point has a unit that is no member of the set or not."""
+    bench, fit, _ = fitted(0.0)
+    nothing = Model((), 0.0, 0.0, {}, {})
+    assert "drag.c" not in bench.own_deviations(nothing, fit.normal)
+    bench.point["drag.c"], bench.on = 0.1, {"drag"}
+    drag = Model((Choice("drag", 0, 1.0),), 0.0, 0.0, {}, {})
+    normal = bench.normal(bench.linearise(drag, corrected=False), drag)
+    assert bench.own_deviations(nothing, normal)["drag.c"] == pytest.approx(-0.1)

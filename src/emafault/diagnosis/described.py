@@ -15,6 +15,7 @@ from .search import FORM_PRIOR, OTHER_FORM, Search
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
 BINS = 30  # of a picture
+FINER = 2.0  # times what a coarse look finds, that a fine one may
 REFINED = 3  # rounds over the parameters of a shape
 STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
@@ -175,7 +176,9 @@ def scanned(
             coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
             if not coarse:
                 continue
-            shape, _, driver = max(coarse, key=lambda c: c[1])
+            shape, roughly, driver = max(coarse, key=lambda c: c[1])
+            if FINER * roughly + PRIOR < float(np.log(places)):  # no shape near it is worth proposing
+                continue
             name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
             fine = form.fine(left, driver, shape)
             value, best = max(

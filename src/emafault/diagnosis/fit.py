@@ -133,8 +133,7 @@ class Bench(NormalEquations):
         """
         for _ in range(ROUNDS):
             self.settle(best, normal)
-            found, _ = self._fitted(best)
-            whites = self.linearise(renew=True, leading=found)
+            whites = self.linearise(leading=self.own_deviations(*self._fitted(best)))
             renewed = self.normal(whites)
             search = self._search(renewed)
             self._against_rivals(search, renewed)

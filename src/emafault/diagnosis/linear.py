@@ -1,7 +1,7 @@
 """Blocks of rows made white and compressed to normal matrices, one a recording and equation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -144,8 +144,11 @@ def disturbance(
                 changes[name] = more * function
     changed = {n: c for n, c in changes.items() if np.any(c)}
     used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
-    columns = [*changed.values(), disturbed.residual - block.residual]
-    some = products(block.bands, block.usable, columns, used)
+    residual = np.asarray(disturbed.residual - block.residual)
+    # a draw that is an outlier, as an edge moved into the next interval, would not have been used
+    drawn = whiten(block.bands, block.usable, residual[:, None].astype(float))[:, 0]
+    used = replace(used, usable=used.usable & (np.abs(drawn) < OUTLIER * np.sqrt(used.variance)))
+    some = products(block.bands, block.usable, [*changed.values(), residual], used)
     index = {n: k for k, n in enumerate(names)}
     k = np.array([*(index[n] for n in changed), len(names)], int)
     gram = np.zeros((len(names) + 1, len(names) + 1))

@@ -34,27 +34,33 @@ class NormalEquations(Point):
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
 
     def linearise(
-        self, model: Model | None = None, renew: bool = False, corrected: bool = True, leading: Model | None = None
+        self,
+        model: Model | None = None,
+        renew: bool = False,
+        corrected: bool = True,
+        leading: Mapping[str, float] | None = None,
     ) -> list[White]:
         """Normal matrices of all blocks at the present point, with every column, or with those that a model has.
 
-        ``renew`` takes the weights from what a full model leaves there, or from what a ``leading`` one does.
-        ``corrected`` takes out what the noise in the regressors adds.
+        ``renew`` takes the weights from what a full model leaves there, ``leading`` from what the leading one does, by
+        its ``own_deviations``. ``corrected`` takes out what the noise in the regressors adds.
         """
         task = self._task(model, corrected)
+        if leading is not None:
+            return self._each(replace(task, full=leading, leads=True), self.recordings)
         if not renew:
             return self._each(task, self.recordings)
         whites = self._each(replace(task, again=True, corrected=False), self.recordings)
-        if leading is None:
-            full = full_model(whites, self._full_prior(*self._columns_of(model)))
-        else:
-            full = self.own_deviations(leading, self.normal(whites, model))
-        return self._each(replace(task, full=full, leads=leading is not None), self.recordings)
+        full = full_model(whites, self._full_prior(*self._columns_of(model)))
+        return self._each(replace(task, full=full), self.recordings)
 
     def own_deviations(self, model: Model, normal: Normal) -> dict[str, float]:
-        """Deviations of columns from the present point in a model, the nuisances fitted beside it."""
+        """Deviations of columns from the present point in a model, the nuisances fitted beside it; what the point has
+        and the model has not is off."""
         out = self.nuisance_deviations(normal, model.deviations)
-        for n, d in model.deviations.items():
+        off = {n: self.prior(n)[2] for n in normal.names if n not in out}
+        given = {n: d for n, d in off.items() if d != 0.0} | model.deviations
+        for n, d in given.items():
             own = self.parameters[n].alias or n if is_parameter(n) else n
             out[own] = out.get(own, 0.0) + d
         return out
@@ -66,7 +72,7 @@ class NormalEquations(Point):
         left = None
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        return Task(self.values(), wanted, left, self.amounts(model), corrected=corrected)
+        return Task(self.values(), wanted, left, self.amounts(model), corrected=corrected, on=frozenset(self.on))
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""

@@ -225,6 +225,19 @@ class Search:
     def run(self, rounds: int = 8) -> list[Model]:
         """Every set looked at, most probable first."""
         self.fit(())
+        # a remainder stands in for several causes at once, from which no single step leads back to them
+        self._climb(rounds, {m for m in self.candidates if self.units[m[0]].kind != "remainder"})
+        self._climb(rounds, set(self.candidates))
+        for model in self.ranked()[:COMPLETED]:  # what is too small to be seen has its prior odds, and is not left out
+            inside = tuple((c.unit, c.variant) for c in model.choices)
+            widths = {(c.unit, c.variant): c.width for c in model.choices}
+            for m in self.candidates:
+                if m[0] not in {u for u, _ in inside} and np.isfinite(self.log_prior((*inside, m))):
+                    self.fit((*inside, m), widths)
+        return self.ranked()
+
+    def _climb(self, rounds: int, among: set[tuple[str, int]]) -> None:
+        """Extend the likeliest sets by some of the candidates until none is left that is worth it."""
         extended: set = set()
         for _ in range(rounds):
             ranked = self.ranked()
@@ -234,44 +247,37 @@ class Search:
                 break
             for model in todo:
                 extended.add(model.choices)
-                self._extend(model)
-        for model in self.ranked()[:COMPLETED]:  # what is too small to be seen has its prior odds, and is not left out
-            inside = tuple((c.unit, c.variant) for c in model.choices)
-            widths = {(c.unit, c.variant): c.width for c in model.choices}
-            for m in self.candidates:
-                if m[0] not in {u for u, _ in inside} and np.isfinite(self.log_prior((*inside, m))):
-                    self.fit((*inside, m), widths)
-        return self.ranked()
+                self._extend(model, among)
 
     def ranked(self) -> list[Model]:
         """Sets seen, most probable first."""
         return sorted((m for m in self.seen.values() if np.isfinite(m.log_posterior)), key=lambda m: -m.log_posterior)
 
-    def _extend(self, model: Model) -> None:
+    def _extend(self, model: Model, among: set[tuple[str, int]]) -> None:
         inside = tuple((c.unit, c.variant) for c in model.choices)
         widths = {(c.unit, c.variant): c.width for c in model.choices}
-        names = {u for u, _ in inside}
-        for m in self._promising(model, names, ADDED):
+        others = {m for m in among if m[0] not in {u for u, _ in inside}}
+        for m in self._promising(model, others, ADDED):
             grown = (*inside, m)
             if np.isfinite(self.log_prior(grown)):
                 self.fit(grown, widths)
         for out in inside:
             kept = tuple(m for m in inside if m != out)
             less = self.fit(kept, widths)
-            others = [m for m in self.candidates if m[0] == out[0] and m != out]
-            for m in [*self._promising(less, names, SWAPPED), *others]:
+            variants = [m for m in self.candidates if m[0] == out[0] and m != out]
+            for m in [*self._promising(less, others, SWAPPED), *variants]:
                 swapped = (*kept, m)
                 if np.isfinite(self.log_prior(swapped)):
                     self.fit(swapped, widths)
 
-    def _promising(self, model: Model, inside: set[str], most: int) -> list[tuple[str, int]]:
+    def _promising(self, model: Model, among: set[tuple[str, int]], most: int) -> list[tuple[str, int]]:
         """Candidates by what each alone would add to a model, the others held where the model has them."""
         r = self.reduced
         d = r.fixed.copy()
         for n, value in model.deviations.items():
             d[r.index[n]] = value
         gains = _gains(r.M, r.b, d, *self.flat)
-        ranked = [(-gains[k], k) for k, m in enumerate(self.candidates) if m[0] not in inside]
+        ranked = [(-gains[k], k) for k, m in enumerate(self.candidates) if m in among]
         every = list(self.candidates)
         return [every[k] for _, k in sorted(ranked)[:most]]
 
