@@ -5,6 +5,7 @@ flux between the interval's ends.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -17,6 +18,7 @@ from .terms import with_hook
 
 RUN = 1e-3  # s, longest run of intervals that is averaged in motion
 RESTING = 5e-2  # s, at rest
+LENGTHS = (0.5, 1.0)  # of the longest, drawn for each run
 UNKNOWN = 0.2  # of the inductance's voltage, where no end currents tell of tolerance and saturation
 BESIDE = 2  # intervals in which a current may fade after its phase is switched off
 NAMES = ("electrical_a", "electrical_b", "electrical_c")
@@ -122,12 +124,17 @@ def _new_runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     rows = np.flatnonzero(known)
     moves = rec.moving[rows]
     # at rest the ripple is the same again and again, and beats with short runs in a way that motion does not
-    longest = np.where(moves, max(1, round(RUN / rec.interval)), max(1, round(RESTING / rec.interval)))
     fresh = np.concatenate([[True], (np.diff(rows) > 1) | np.diff(moves)])
-    first = np.flatnonzero(fresh)
-    since = np.arange(len(rows)) - first[np.cumsum(fresh) - 1]
-    starts = np.flatnonzero(since % longest == 0)
-    return starts, np.diff(starts, append=len(rows)), rows
+    # ends that follow commutations regularly would show the ripple, aliased, as a wave at constant speed
+    rng = np.random.default_rng(0)
+    starts = []
+    for first, end in pairwise([*np.flatnonzero(fresh), len(rows)]):
+        longest = (RUN if moves[first] else RESTING) / rec.interval
+        at = first
+        while at < end:
+            starts.append(at)
+            at += max(1, round(longest * rng.uniform(*LENGTHS)))
+    return np.array(starts), np.diff(starts, append=len(rows)), rows
 
 
 def switched_on(state: State, j: int) -> np.ndarray:
