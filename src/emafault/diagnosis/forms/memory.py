@@ -4,8 +4,8 @@ what warms up once it is switched on."""
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import lfilter
 
+from ...first_order import followed
 from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
 
@@ -33,7 +33,7 @@ def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
         x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
     steps = np.diff(coordinates["time"])
     share = 1.0 - np.exp(-float(np.median(steps)) / constant) if len(steps) else 1.0
-    return lfilter([share], [1.0, share - 1.0], x)
+    return followed(x, share, 1.0 - share)
 
 
 def _values(left: Left, driver: int, tried: list[tuple[int, float]], slow: bool = False) -> np.ndarray:

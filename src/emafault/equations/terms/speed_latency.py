@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..first_order import followed
+from ...first_order import followed
 
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})

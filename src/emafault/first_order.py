@@ -1,6 +1,6 @@
 """A first-order filter along a signal."""
 
-from ..compiled import compiled
+from .compiled import compiled
 
 
 @compiled
