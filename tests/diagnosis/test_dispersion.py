@@ -37,12 +37,12 @@ class Machine:
         return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
 
 
-def fitted(burst):
+def fitted(burst, kind=Machine):
     """Such a bench, its fit, and the set with the coefficient."""
-    machine = Machine(burst)
+    machine = kind(burst)
     bench = Bench(machine, list(machine.noise))
     white = Weights(np.ones(ROWS, bool), np.zeros(0), np.ones(ROWS))
-    bench.carried = {n: {"torque": white} for n in machine.noise}
+    bench.carried = {n: {"torque": white, "bus": white} for n in machine.noise}
     drag = Model((Choice("drag", 0, 1.0),), 0.0, 0.0, {}, {})
     normal = bench.normal(bench.linearise(drag, corrected=False), drag)
     reduced = bench.reduce(normal)
@@ -59,6 +59,30 @@ def test_what_comes_and_goes_along_a_unit_disperses_its_score():
     """100 rows of variance 1 have a score of variance 100, to which a burst adds its square times 100^2."""
     found = overdispersion(*fitted(0.5), "drag")
     assert found == pytest.approx(1.0 + 0.25 * 100.0, rel=0.5)
+
+
+class Shared(Machine):
+    """The coefficient's equation has the nuisance along the same driver, and another equation tells the nuisance."""
+
+    parameters = {"drag.c": DRAG, "level": Parameter("level", 0.0, 0.0, 10.0)}  # noqa: RUF012
+
+    def blocks(self, values, recording, wanted=None, disturbed=False):
+        driver, level = self.driver[recording], values["level"]
+        quiet = np.random.default_rng(int(recording[1:]) + 100).standard_normal(ROWS)
+        own = quiet + (values["drag.c"] - 0.1 + level) * driver
+        other = self.noise[recording] + level * driver
+        bands, usable = [np.ones(ROWS)], np.ones(ROWS, bool)
+        columns = {"drag.c": driver, "level": driver}
+        return [
+            Block(recording, "torque", own, columns, bands, usable),
+            Block(recording, "bus", other, {"level": driver}, bands, usable),
+        ]
+
+
+def test_the_score_is_that_of_all_equations_that_an_estimate_rests_on():
+    """The burst is in the equation that tells the nuisance, in which the unit does not act."""
+    assert overdispersion(*fitted(0.0, Shared), "drag") == 1.0
+    assert overdispersion(*fitted(0.5, Shared), "drag") > 5.0
 
 
 def test_a_set_without_a_unit_that_the_point_has_leaves_what_the_unit_adds():

@@ -54,13 +54,12 @@ def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[t
     residual = bench.own_deviations(model, fit.normal)
     score = _by_column(_taken_out(bench, fit, model, unit, added) | added, aliases)
     wanted = [n for n in dict.fromkeys([*residual, *score]) if is_parameter(n)]
-    acting = [aliases.get(n, n) for n in added]
     own = bench.amounts(model)
     out: dict[str, list[tuple[float, float, int]]] = {}
     for name in bench.recordings:
         for block in bench.machine.blocks(bench.values(), name, wanted=set(wanted)):
             weights = bench.carried[name].get(block.equation)
-            if weights is None or not any(n in block.columns for n in acting):
+            if weights is None or not any(n in block.columns for n in wanted):
                 continue
             left = any(n.startswith(f"remainder.{block.equation}.") for n in residual)
             names, rows = white_rows(block, wanted, left, own if block.equation not in SETTINGS else None)

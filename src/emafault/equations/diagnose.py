@@ -192,7 +192,10 @@ def _diagnosed(
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
-    verdict["shrinks"] = shrinks(bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"])
+    told_units = {*reading.named, *(e for g in reading.groups for e in g), *reading.forms, *reading.remainders}
+    verdict["shrinks"] = shrinks(
+        bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"], told_units
+    )
     fitted = [
         {**p, "name": n.split(".", 1)[-1]}
         for entry in verdict["which"][:1]

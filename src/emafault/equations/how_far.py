@@ -1,6 +1,6 @@
 """How far the gap shrinks on the recordings that took no part: the ladder in signal, features and fault vector."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,21 @@ def shrinks(
     vectors: Mapping[str, dict],
     recordings: Mapping[str, Recording],
     found: list[dict],
+    told: Collection[str],
 ) -> dict[str, Any]:
-    """The ladder on the confirm recordings; enters what each described form closes alone."""
+    """The ladder on the confirm recordings; enters what each described form closes alone.
+
+    ``told``: units that the verdict tells. What the explored recordings had beside them and the others have refused is
+    not inserted, but where it stands for a remainder that is told.
+    """
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
     ladder, explored, fit = held_out.ladder, held_out.explored, held_out.fit
     reading = read(fit.models, fit.search.units.values())
-    model = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
+    leading = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
+    left = {u.split(":", 1)[1] for u in told if u.startswith("remainder:")}
+    kept = [c for c in leading.choices if c.unit in told or left & set(fit.search.units[c.unit].equations)]
+    model = fit.search.fit(tuple((c.unit, c.variant) for c in kept))
     off = {n: p.off for n, p in bench.parameters.items()}
     nominal_unit = null(explored)
     recalibrated = {**off, **nominal_unit.values()}
@@ -48,7 +56,7 @@ def shrinks(
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(
-        (_inserted(ladder, explored, fit, m, recalibrated) for m in _with_and_without_remainders(fit, model)),
+        (_inserted(ladder, explored, fit, m, recalibrated) for m in _insertable(fit, model, told)),
         key=lambda found: rms(found[0]),
     )
     at_nominal = ladder.blocks(nominal, remainders=True)
@@ -75,10 +83,13 @@ def shrinks(
     }
 
 
-def _with_and_without_remainders(fit: Fit, model: Model) -> list[Model]:
-    """A set, and the same without its remainders: one that does not carry over to other recordings is not inserted."""
-    kept = tuple((c.unit, c.variant) for c in model.choices if not c.unit.startswith("remainder:"))
-    return [model] if len(kept) == len(model.choices) else [model, fit.search.fit(kept)]
+def _insertable(fit: Fit, model: Model, told: Collection[str]) -> list[Model]:
+    """A set, what of it is told, and that without its remainders: what does not carry over to other recordings is not
+    inserted."""
+    kept = [(c.unit, c.variant) for c in model.choices if c.unit in told]
+    plain = [m for m in kept if not m[0].startswith("remainder:")]
+    others = [m for m in dict.fromkeys((tuple(kept), tuple(plain))) if len(m) < len(model.choices)]
+    return [model, *(fit.search.fit(m) for m in others)]
 
 
 def _inserted(
