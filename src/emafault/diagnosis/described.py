@@ -99,7 +99,7 @@ class WithForms:
                     continue
                 columns = self.columns(form, block)
                 if columns is None and (form.channel, block.equation) in self.machine.moving:
-                    x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
+                    x = FORMS[form.word].columns(self.machine.sampled(block.recording, form.channel), form.values)
                     columns = self.machine.seen_at(values, block.recording, x, less)
                 if columns is None or not columns.any():
                     continue
@@ -114,7 +114,7 @@ class WithForms:
         for form in self.forms:
             here = np.array([values.get(n, 0.0) for n in form.names(recording)])
             if here.any() and form.channel in getattr(self.machine, "bending", ()):
-                x = here @ FORMS[form.word].columns(self.machine.sampled(recording), form.values)
+                x = here @ FORMS[form.word].columns(self.machine.sampled(recording, form.channel), form.values)
                 out[form.channel] = out.get(form.channel, 0.0) + x
         return out
 
@@ -126,7 +126,7 @@ class WithForms:
                 for other in [k for k in self.known if k[0] != block.recording]:
                     del self.known[other]
             if form.channel:
-                x = FORMS[form.word].columns(self.machine.sampled(block.recording), form.values)
+                x = FORMS[form.word].columns(self.machine.sampled(block.recording, form.channel), form.values)
                 for equation, rows in self.machine.seen_in(form.channel, block.recording, x).items():
                     self.known[block.recording, equation, form.id, form.shape] = rows
             else:

@@ -45,7 +45,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
         channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
         if form.id in told and channel and not channel.startswith("k_"):
             own = np.array([values.get(n, 0.0) for n in form.names(name)])
-            x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name), form.values)
+            x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name, form.channel), form.values)
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
             yield words, partial(_less, channel=channel, x=x)
     for quantity in ("voltage", "current", "output"):

@@ -308,9 +308,14 @@ class ReferenceActuator:
         force = np.array([torque.two_intervals(-row * drive) for row in x])
         return {electrical.NAMES[j]: voltage, "torque": force}
 
-    def sampled(self, name: str) -> dict[str, Any]:
-        """What the samples of a recording lie along."""
-        return self._functions_of(self.recordings[name])
+    def sampled(self, name: str, place: str) -> dict[str, Any]:
+        """What the samples of a recording's channel lie along: those of an angle are taken at an interval's end, where
+        the others are means over it."""
+        rec = self.recordings[name]
+        found = self._functions_of(rec)
+        if place not in ("angle", "output"):
+            return found
+        return {**found, "angle": rec.angle, "rotor_angle": np.mod(rec.angle, 2.0 * np.pi)}
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
         state = State(rec, Point(values, rec.name, wanted))
@@ -439,8 +444,10 @@ class ReferenceActuator:
         rows = [of(d) for d in drivers]
         if equation == "control":
             rows.append(control.late(state))
+        along = {k: of(v) for k, v in base.items()}
         return {
-            **{k: of(v) for k, v in base.items()},
+            **along,
+            "rotor_angle": np.mod(along["angle"], 2.0 * np.pi),
             "phi": np.array([of(f) for f in phi]),
             "drivers": np.array(rows),
             **kinds,
@@ -458,6 +465,8 @@ def rows_of(state: State, equation: str) -> Callable[[np.ndarray], np.ndarray] |
     if equation == "control":
         width = control.block_length(rec)
         return rows_at((np.arange(rec.size // width - 1) + 1) * width)
+    if equation == "torque":
+        return torque.two_intervals
     if equation == "commutation":
         return rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
     if equation.startswith("electrical") and rec.current_end is None:
