@@ -152,3 +152,29 @@ def test_an_experiment_says_what_it_does_not_simulate():
     text = experiment_text(verdict, {"cogging": {"a": 0.01}}, "mine")
     assert "# not simulated: The bus equation leaves more.\n" in text and "A wave." not in text
     assert "place: torque" in text and "position_gain: 80.0" in text and "speed_gain" not in text
+
+
+def test_a_wave_lies_alike_in_both_directions():
+    """A row of the torque equation is between two intervals, a sample of the angle at an interval's end."""
+    of_torque = Described("~o", "order", "torque", 0, (("order", 5.3, 0.0, "1"),), 1.0, 1.0)
+    of_angle = Described("~o", "order", "sensor_angle", 0, (("order", 5.3, 0.0, "1"),), 1.0, 1.0, "position", "angle")
+    for form, size in ((of_torque, 0.01), (of_angle, 2e-3)):
+        names = form.names("a.nc")
+        entry = of_form(form, {names[0]: (size, 0.0), names[1]: (0.0, 0.0)}, ["a.nc"], ACTUATOR)
+        rows = []
+        for unlisted in ([entry], []):
+            machine = WithForms(machine_of({"a.nc": recorded(unlisted)}), [form])
+            off = {n: p.off for n, p in machine.parameters.items()}
+            block = next(b for b in machine.blocks(off, "a.nc") if b.equation == (form.seen or form.equation))
+            rows.append((block, np.column_stack([*(block.columns[n] for n in names), block.residual])))
+        direction = block.coordinates["direction"]
+        clear = block.usable & rows[0][0].usable & (np.abs(block.coordinates["rotor_speed"]) > 20.0)
+        phases = []
+        for sign in (1.0, -1.0):
+            mine = clear & (direction == sign)
+            columns = rows[0][1][mine, :2]
+            left = (rows[0][1] - rows[1][1])[mine, 2]
+            cosine, sine = np.linalg.lstsq(columns, -left, rcond=None)[0]
+            assert np.hypot(cosine, sine) == pytest.approx(size, rel=0.1)
+            phases.append(np.arctan2(sine, cosine))
+        assert np.abs(phases).max() < 0.02
