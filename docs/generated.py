@@ -1,15 +1,18 @@
 """Pages of the site that are made of the repository: a hook of mkdocs.
 
 The first page is the README and ``contributing.md`` is CONTRIBUTING.md, with their links; the gallery is made of the
-catalogue and of the files that put its effects into equations, the verdict's page of its schema.
+catalogue and of the files that put its effects into equations, with the pictures of ``signatures.py``, the verdict's
+page of its schema.
 """
 
 import json
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import signatures
 from mkdocs.structure.files import File
 
 from emafault.diagnosis.forms import FORMS
@@ -21,6 +24,13 @@ ROOT = Path(__file__).parents[1]
 HERE = {"CONTRIBUTING.md": "contributing.md"}
 #: a link to a file, not to a picture, an address or a heading of the same page
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|#)([^)#\s]+)(#[^)]*)?\)")
+#: a picture stands beside its own text alone, and above it where there is no room
+STYLE = """<style>
+.signature { float: right; width: 340px; margin: 0 0 1em 1em; background: white; }
+@media (max-width: 44em) { .signature { float: none; display: block; width: 100%; margin: 0; } }
+</style>
+"""
+CLEAR = '<div style="clear: both"></div>\n'
 KINDS = {
     "structural": "Structure: what the nominal model lacks",
     "calibration": "Calibration: the unit outside its tolerance",
@@ -38,6 +48,8 @@ def on_files(files, config):
     }
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
+    for name, picture in pictures().items():
+        files.append(File.generated(config, name, content=picture.svg))
     # pages that the navigation does not name stand at its end
     named = set(re.findall(r"[\w-]+\.md", json.dumps(config.nav)))
     rest = sorted(f.src_uri for f in files.documentation_pages() if f.src_uri not in named)
@@ -59,14 +71,28 @@ def on_page_markdown(markdown, page, config, files):
     return LINK.sub(link, markdown).replace("](docs/images/", "](images/")
 
 
+@cache
+def pictures() -> dict[str, signatures.Picture]:
+    """Signatures of all effects and forms, by the name of the file."""
+    effects = {f"signatures/{name}.svg": signatures.of_effect(name) for name in EFFECTS}
+    return effects | {f"signatures/form_{name}.svg": signatures.of_form(name) for name in FORMS}
+
+
 def gallery() -> str:
     """What the diagnosis knows: effects of the catalogue by kind, then the forms of what no catalogue lists."""
     out = [
         "# Effects and forms\n",
+        STYLE,
         "What a diagnosis can name, and what it can describe, made of `conf/effect/`, `src/emafault/equations/terms/` "
         "and `src/emafault/diagnosis/forms/`. The signature is the term that an effect adds. The equations it acts in "
         "distinguish it from effects of other equations, its signature from those of the same equation. "
         "Where two look alike on given recordings, a verdict names the group.\n",
+        "Each picture is what an effect adds to the residual of the nominal equation, measured less predicted, at half "
+        "of the effect's realistic range. All are computed in one recording of the default actuator without noise, a "
+        "sine of 1 Hz that reaches 157 rad/s in both directions. Points are rows of the equation, a line over them "
+        "their medians. An effect of single phases has its full size in phase a, half of it in phase b (the other way, "
+        "where there is one), none in phase c. How effects enter the simulation: "
+        "[the actuator's equations](equations.md).\n",
     ]
     kinds = list(dict.fromkeys(e.kind for e in EFFECTS.values()))
     for kind in kinds:
@@ -75,26 +101,39 @@ def gallery() -> str:
             out += _effect(effect)
     out.append("## Described forms: what no catalogue lists\n")
     for name, form in FORMS.items():
+        file = f"signatures/form_{name}.svg"
         out.append(f"### {_words(name)}\n")
+        out.append(_image(file))
         out.append(f"{_paragraph(form)}\n")
+        out.append(f"**Told apart**: {pictures()[file].apart}\n")
         places = ", ".join(f"`{c}`" for c in form.CHANNELS) or "none"
         each = "in each recording by itself" if form.EACH else "the same in all recordings"
         out.append(
-            f"Along {_words(form.ALONG).lower()}; its coefficients are {each}; channels that may have it: {places}.\n"
+            f"Along {_words(form.ALONG).lower()}; its coefficients are {each}; channels that may have it: {places}. "
+            f"Drawn as a torque, of the size of {pictures()[file].sizes}.\n"
         )
+        out.append(CLEAR)
     return "\n".join(out)
 
 
 def _effect(effect) -> Iterator[str]:
     term = TERMS[effect.id]
     source = (ROOT / "conf/effect" / f"{effect.id}.yaml").read_text().splitlines()[0].lstrip("# ")
+    file = f"signatures/{effect.id}.svg"
     yield f"### {_words(effect.id)} {{ #{effect.id} }}\n"
+    yield _image(file)
     yield f"{term.SENTENCE[0].upper()}{term.SENTENCE[1:]}. {_paragraph(term)}\n"
     yield f"**Signature** ({', '.join(_words(q).lower() for q in effect.equations)}): {source}\n"
+    yield f"**Told apart**: {pictures()[file].apart} *Drawn for* {pictures()[file].sizes}.\n"
+    yield CLEAR
     yield "| parameter | unit | nominal | from | to |\n|---|---|---|---|---|"
     for name, p in effect.parameters.items():
         yield f"| `{name}` | {p.units} | {p.nominal:g} | {p.low:g} | {p.high:g} |"
     yield ""
+
+
+def _image(file: str) -> str:
+    return f"![{pictures()[file].alt}]({file}){{ .signature loading=lazy }}\n"
 
 
 def verdict() -> str:

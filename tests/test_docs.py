@@ -1,8 +1,10 @@
 """Pages of the documentation: links lead somewhere, and what a page tells of the configuration stands there."""
 
+import importlib
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -10,6 +12,7 @@ from actuator.test_oracle import TOLERANCE
 from emafault.actuator.conduction import BUS_FILTER, MAX_SEGMENT
 from emafault.actuator.kernel import SHAFT_DAMPING
 from emafault.actuator.state import COGGING_ORDER, MOTOR_SHARE
+from emafault.diagnosis.forms import FORMS
 from emafault.effects import EFFECTS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -79,3 +82,48 @@ def test_the_equations_tell_every_effect_and_the_figures_of_the_code():
         assert [float(x) for x in re.findall(told, EQUATIONS)] == [pytest.approx(value)], told
     assert TOLERANCE["speed"] == TOLERANCE["angle"] == TOLERANCE["position"]
     assert TOLERANCE["voltage"] == TOLERANCE["power"]
+
+
+@pytest.fixture(scope="module")
+def signatures():
+    """The module that draws the pictures of the gallery."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "docs")
+        return importlib.import_module("signatures")
+
+
+def test_each_effect_and_form_has_a_signature_that_is_something(signatures):
+    assert set(signatures.VIEWS) == set(EFFECTS) and set(signatures.FORM_VIEWS) == set(FORMS)
+    for name, views in signatures.VIEWS.items():
+        for view in views:
+            assert {"commutation": "control"}.get(view.equation, view.equation) in EFFECTS[name].equations, name
+            shown = np.concatenate([c.value for c in signatures.curves(name, view)])
+            assert np.all(np.isfinite(shown)) and np.ptp([0.0, *shown]) > 1e-6, name
+    for name in FORMS:
+        assert np.ptp(signatures.form_curve(name).value) > 0.5 * signatures.FORM_SIZE, name
+
+
+def test_signatures_have_the_sizes_of_the_catalogue(signatures):
+    """Three that are plain by hand."""
+    actuator = signatures.machine().actuator
+
+    def shown(name):
+        (view,) = signatures.VIEWS[name]
+        (curve,) = signatures.curves(name, view)
+        return curve.along, curve.value, signatures.sizes(name)
+
+    speed, torque, size = shown("viscous_friction")
+    drag = actuator.viscous_friction * (size["scale"] - 1.0)
+    assert np.polyfit(speed, torque, 1)[0] == pytest.approx(-drag, rel=0.02)
+    angle, torque, size = shown("load_spring")
+    assert np.polyfit(angle, torque, 1)[0] == pytest.approx(-size["c"] / actuator.gear_ratio, rel=0.02)
+    speed, torque, size = shown("stribeck")
+    wanted = -size["a"] * np.exp(-np.abs(speed) / size["w_s"]) * np.sign(speed)
+    assert np.median(np.abs(torque - wanted)) < 0.02 * size["a"]
+
+
+def test_a_picture_says_what_it_shows(signatures):
+    for picture in (signatures.of_effect("unit_calibration"), signatures.of_form("bump")):
+        assert (picture.svg.count("<svg") == 1 and "(N m)" in picture.svg) or "(V)" in picture.svg
+        assert re.search(r"over .*; from .* to .* (V|N m)", picture.alt) and picture.apart
+        assert not set('"[]') & set(picture.alt)
