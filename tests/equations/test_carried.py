@@ -8,8 +8,9 @@ from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import time_axis
 from emafault.actuator.unlisted import followed, row_of
 from emafault.dataset import simulate_and_measure
-from emafault.diagnosis.described import Described, WithForms
+from emafault.diagnosis.described import Described, WithForms, refined
 from emafault.diagnosis.forms import FORMS
+from emafault.diagnosis.whitening import Weights
 from emafault.equations.carried import DRIVERS, of_chain, of_form
 from emafault.equations.handover import experiment_text
 from emafault.io.recording import Recording
@@ -59,11 +60,12 @@ def test_an_entry_has_the_values_of_the_form(word):
         np.testing.assert_allclose(got, wanted, atol=2e-3 * np.abs(wanted).max())
 
 
-def recorded(unlisted):
-    """A recording of the nominal unit with these entries, its noise a tenth of the usual."""
+def recorded(unlisted, voltage=0.1):
+    """A recording of the nominal unit with these entries, its noise a tenth of the usual, that of voltages ``voltage``
+    times the usual."""
     runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
     position = command_positions("sine", COMMANDS["sine"], 0.8, ACTUATOR.control_period)
-    sensors = {name: 0.1 * value for name, value in SPEC["sensors"].items()}
+    sensors = {name: (voltage if name == "voltage" else 0.1) * value for name, value in SPEC["sensors"].items()}
     spec = {"sensors": sensors, "seed": 1, "unlisted": unlisted}
     out = simulate_and_measure(spec, runs, position, 0.8, 2e-4, recording="a.nc")
     ambient = float(out.pop("ambient_temperature")[0])
@@ -178,3 +180,18 @@ def test_a_wave_lies_alike_in_both_directions():
             assert np.hypot(cosine, sine) == pytest.approx(size, rel=0.1)
             phases.append(np.arctan2(sine, cosine))
         assert np.abs(phases).max() < 0.02
+
+
+def test_a_coefficient_of_two_equations_is_looked_at_in_both():
+    """Loud voltages say little of a weak magnet, the torque all."""
+    rows = (("centre", 2.3, 0.1, "rad"), ("width", 0.55, 0.1, "rad"))
+    form = Described("~b", "bump", "electrical_b", 2, rows, 1.0, 1.0, "electrical_b", "k_b")
+    entry = {"place": "emf_b", "form": "bump", "centre": 2.1, "width": 0.4, "depth": -0.1}
+    machine = WithForms(machine_of({"a.nc": recorded([entry], voltage=30.0)}), [form])
+    off = {n: p.off for n, p in machine.parameters.items()}
+    blocks = machine.blocks(off, "a.nc")
+    loud = {b.equation: 900.0 if b.equation.startswith("electrical") else 1.0 for b in blocks}
+    white = {b.equation: Weights(b.usable, np.zeros(0), np.full(len(b.residual), loud[b.equation])) for b in blocks}
+    better = refined(machine, form, blocks, {"a.nc": white}, off, {}).values
+    assert better["centre"] == pytest.approx(2.1, abs=0.04)
+    assert better["width"] == pytest.approx(0.4, abs=0.04)

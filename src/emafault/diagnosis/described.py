@@ -241,24 +241,28 @@ def refined(
     carried : by recording and equation, the weights of its rows
     free : what is free beside it, see ``scanned``
     """
-    own = without(machine, form, [b for b in blocks if b.equation == form.equation], values)
-    if not own:  # a channel's: its columns are differences of all equations, too dear to look around
-        return form
-    mine = {n for b in own for n in form.names(b.recording)}
-    beside = {n: q for n, q in free.items() if n not in mine}
-    left = Left(form.equation, own, [carried[b.recording][b.equation] for b in own], beside)
     module = FORMS[form.word]
+    if form.channel and form.channel not in machine.coefficients(form.seen, form.driver):
+        return form  # a channel's columns are differences of all equations, too dear to look around
+    mine = {n for b in blocks for n in form.names(b.recording)}
+    beside = {n: q for n, q in free.items() if n not in mine}
+    acting: dict[str, list[Block]] = {}
+    for b in blocks if form.channel else [b for b in blocks if b.equation == form.equation]:
+        if machine.columns(form, b) is not None:
+            acting.setdefault(b.equation, []).extend(without(machine, form, [b], values))
+    lefts = [Left(e, own, [carried[b.recording][e] for b in own], beside) for e, own in acting.items()]
 
     def value(at: Described) -> float:
-        def columns(b: Block) -> np.ndarray:
-            return module.columns(b.coordinates, at.values)
-
         def beside_constant(b: Block) -> np.ndarray:
-            return np.vstack([np.ones(len(b.residual)), columns(b)])
+            if not form.channel:
+                return np.vstack([np.asarray(b.coordinates["drivers"][form.driver]), at.columns(b)])
+            x = module.columns(machine.sampled(b.recording, form.channel), at.values)
+            return machine.seen_in(form.channel, b.recording, np.vstack([np.ones(x.shape[1]), x]))[b.equation]
 
         if module.EACH:
-            return sum(gain(*p) for p in left.each(columns, at.driver))
-        return gain(*beside_first(*left.products(beside_constant, at.driver)))
+            return sum(gain(*p) for left in lefts for p in left.each(at.columns, 0))
+        g, G = zip(*(left.products(beside_constant, 0) for left in lefts), strict=True)
+        return gain(*beside_first(np.sum(g, axis=0), np.sum(G, axis=0)))
 
     best = value(form)
     for _ in range(REFINED):
