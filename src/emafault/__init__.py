@@ -12,6 +12,8 @@ _PUBLIC = {
     "Diagnosis": "api.diagnosis",
     "Identification": "api.identification",
     "InputError": "errors",
+    "MachineDiagnoses": "api.machine",
+    "MachineDiagnosis": "api.machine",
     "Plan": "api.plan",
     "Recording": "io.recording",
     "Recordings": "api.recordings",

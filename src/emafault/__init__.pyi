@@ -3,6 +3,8 @@ from .api.diagnosis import Diagnosis as Diagnosis
 from .api.diagnosis import diagnose as diagnose
 from .api.identification import Identification as Identification
 from .api.identification import identify as identify
+from .api.machine import MachineDiagnoses as MachineDiagnoses
+from .api.machine import MachineDiagnosis as MachineDiagnosis
 from .api.plan import Plan as Plan
 from .api.plan import plan as plan
 from .api.recordings import Recordings as Recordings

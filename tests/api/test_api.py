@@ -89,8 +89,17 @@ def test_every_public_name_stands_in_the_documentation():
     for name in emafault.__all__:
         assert f"`{name}" in text or f"emafault.{name}" in text, name
         public = getattr(emafault, name)
-        for method in (m for m in vars(public) if not m.startswith("_")) if isinstance(public, type) else ():
-            if name in ("Diagnosis", "Identification", "Plan", "Recordings", "Actuator"):
+        if name in (
+            "Diagnosis",
+            "Identification",
+            "MachineDiagnoses",
+            "MachineDiagnosis",
+            "Plan",
+            "Recordings",
+            "Actuator",
+        ):
+            own = [vars(base) for base in public.__mro__ if base.__module__.startswith("emafault")]
+            for method in (m for names in own for m in names if not m.startswith("_")):
                 assert f"`{method}" in text, (name, method)
 
 
@@ -102,6 +111,8 @@ def test_every_public_name_stands_in_the_documentation():
         (lambda: emafault.diagnose(3), "recordings: got 3"),
         (lambda: emafault.diagnose({}), "accepted are a path"),
         (lambda: emafault.diagnose(emafault.example(), exclude=["gremlins"]), "gremlins"),
+        (lambda: emafault.diagnose(emafault.example(), twin="dq_machine"), "with a twin is the path"),
+        (lambda: emafault.diagnose("a.csv", emafault.Actuator.reference(), twin="dq_machine"), "an actuator or a twin"),
         (lambda: emafault.identify(emafault.example(), level=2.0), "level"),
         (lambda: emafault.Actuator.reference(gear=3), r"actuator\.gear"),
         (lambda: emafault.Actuator.reference(gear_ratio=-3), r"actuator\.gear_ratio"),

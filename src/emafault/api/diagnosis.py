@@ -1,44 +1,37 @@
 """Diagnosis of a bench: where a simulator and recordings disagree, which effect causes it, how far it explains it."""
 
-import html
 import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from ..equations import run
 from ..equations.diagnose import Diagnosed
 from ..equations.page import finding
+from ..errors import InputError, shown
 from ..io.bench import Bench, check_bench
 from ..io.recording import Recording
 from ..reporting.written import REPORT, checked, refuse_foreign
 from .actuator import Actuator
-from .pictures import alone, as_html
+from .machine import MachineDiagnoses, diagnose_machine
+from .pictures import alone
 from .recordings import recordings_of
 from .table import Table
+from .verdict import Told, as_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Given = str | Path | Recording | Mapping[str, Recording] | Sequence[Recording]
 
-class Diagnosis:
+
+class Diagnosis(Told):
     """A verdict on a bench, with tables, plots and the page that ``emafault diagnose`` writes."""
 
     def __init__(self, found: Diagnosed, bench: Bench) -> None:
+        super().__init__(found.verdict)
         self._found, self._bench = found, bench
-
-    @property
-    def kind(self) -> str:
-        """``explained``, ``group``, ``described``, ``partly``, ``unknown`` or ``no_gap``."""
-        return str(self._found.verdict["verdict"])
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The effects that are named; those of one group where these recordings cannot tell them apart."""
-        first = [e for e in self._found.verdict["which"][0]["effects"] if e != "unknown"]
-        groups = [e for group in self._found.verdict["groups"] for e in group]
-        return tuple(dict.fromkeys([*first, *groups])) if self.kind in ("explained", "group", "partly") else ()
 
     @property
     def sentences(self) -> list[str]:
@@ -55,32 +48,6 @@ class Diagnosis:
         """Everything, as ``diagnosis.json`` has it; ``emafault schema verdict`` prints its schema."""
         return json.loads(checked(self._found.verdict | {"next_experiment": self._found.next_experiments()}))
 
-    def probabilities(self) -> Table:
-        """A row a set of effects: posterior probability; they are exclusive and sum to one."""
-        rows = [
-            [" + ".join(entry["effects"]) or "no effect", entry["probability"]]
-            for entry in self._found.verdict["which"]
-        ]
-        return Table(["effects", "probability"], rows)
-
-    def parameters(self) -> Table:
-        """A row a fitted number of what was named and described: value, ends of the 90 % interval and unit."""
-        verdict = self._found.verdict
-        rows = [
-            [p["effect"], name, p["value"], p["low"], p["high"], p["units"]]
-            for name, p in (verdict["which"][0].get("parameters") or {}).items()
-        ] + [
-            [f"{d['form']} in {d['equation']}", name, p["value"], p["low"], p["high"], p["units"]]
-            for d in verdict["discovered"]
-            for name, p in d["parameters"].items()
-        ]
-        return Table(["cause", "parameter", "value", "low", "high", "unit"], rows)
-
-    def residuals(self) -> Table:
-        """A row an equation: the operating region that most of its residual lies in, its size and share."""
-        columns = ["equation", "along", "from", "to", "z", "share"]
-        return Table(columns, [[entry[c] for c in columns] for entry in self._found.verdict["where"]])
-
     def fault_vector(self) -> Table:
         """A row a recording and component: before, after and the ends of the 90 % interval (N and xi in 1, dT in K)."""
         rows = [
@@ -89,25 +56,6 @@ class Diagnosis:
             for c, after in entry["after"].items()
         ]
         return Table(["recording", "component", "before", "after", "low", "high"], rows)
-
-    def gap(self) -> Table:
-        """A row a kind of misfit on the recordings set aside, in multiples of its noise; empty where none was."""
-        columns = ["nominal", "recalibrated", "placebo", "after", "floor", "closed"]
-        rungs = {kind: rung for kind, rung in self._found.verdict["shrinks"].items() if rung}
-        return Table(["misfit of", *columns], [[kind, *(rung.get(c) for c in columns)] for kind, rung in rungs.items()])
-
-    def plot_probabilities(self) -> "Figure":
-        """Posterior probability and gain in log evidence of every set of effects."""
-        from ..equations.page import ranked
-        from ..reporting.diagnosis import draw_ranking
-
-        return alone(draw_ranking(ranked(self._found.verdict)))
-
-    def plot_gap(self) -> "Figure":
-        """How far the misfit shrinks on the recordings set aside."""
-        from ..reporting.diagnosis import draw_ladder
-
-        return alone(draw_ladder(self._found.verdict["shrinks"]))
 
     def plot_fault_vector(self) -> "Figure":
         """The fault vector before and after, with 90 % intervals, beside the truth where a recording holds it."""
@@ -138,29 +86,49 @@ class Diagnosis:
         return "\n".join([f"Diagnosis of {self._bench.name}: {self.kind}", *self.sentences])
 
     def _repr_html_(self) -> str:
-        said = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in self.sentences)
-        head = f"<p><b>Diagnosis of {html.escape(self._bench.name)}: {self.kind.replace('_', ' ')}</b></p>"
-        picture = as_html(self.plot_probabilities(), f"Posterior probabilities\n{self.probabilities()}")
-        return f"{head}<ul>{said}</ul>{self.parameters()._repr_html_()}{picture}"
+        return as_page(f"Diagnosis of {self._bench.name}", self.sentences, self)
 
 
+@overload
 def diagnose(
-    recordings: str | Path | Recording | Mapping[str, Recording] | Sequence[Recording],
+    recordings: Given,
     actuator: Actuator | None = None,
     exclude: Sequence[str] = (),
-) -> Diagnosis:
-    """Diagnose recordings of one actuator, as ``emafault diagnose`` does.
+    twin: None = None,
+) -> Diagnosis: ...
+@overload
+def diagnose(
+    recordings: str | Path,
+    actuator: None = None,
+    exclude: Sequence[str] = (),
+    *,
+    twin: str | Path,
+) -> MachineDiagnoses: ...
+def diagnose(
+    recordings: Given,
+    actuator: Actuator | None = None,
+    exclude: Sequence[str] = (),
+    twin: str | Path | None = None,
+) -> Diagnosis | MachineDiagnoses:
+    """Diagnose recordings of one actuator, or of a measured machine, as ``emafault diagnose`` does.
 
     Parameters
     ----------
-    recordings : what ``read`` gives, the path of a file or folder, or recordings
+    recordings : what ``read`` gives, the path of a file or folder, or recordings; with ``twin`` a path
     actuator : the nominal one; None takes the reference actuator
     exclude : effects of the catalogue to leave out
+    twin : name of the measured machine that they come from, or a Python file that states one
 
     Raises
     ------
-    InputError : recordings or effects that cannot be used
+    InputError : recordings, effects or a machine that cannot be used
     """
+    if twin is not None:
+        if not isinstance(recordings, str | Path):
+            raise InputError(f"recordings: got {shown(repr(recordings))}, accepted with a twin is the path of its file")
+        if actuator is not None:
+            raise InputError("actuator: a measured machine has none, accepted is either an actuator or a twin")
+        return diagnose_machine(recordings, twin, exclude)
     given = recordings_of(recordings)
     actuator = actuator or Actuator.reference()
     bench = check_bench(given.name, dict(given), actuator.parameters)
