@@ -2,11 +2,13 @@
 
 import json
 import re
+from contextlib import chdir
 from pathlib import Path
 from xml.etree.ElementTree import parse
 
 import pytest
 
+import pages
 from emafault.cli import main
 from emafault.datasheet.compose import of_file
 from emafault.datasheet.sheet import read_sheet
@@ -26,16 +28,11 @@ def session(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def said(session):
-    import contextlib
-    import io
-
     out = {}
-    with contextlib.chdir(session):
+    with chdir(session):
         for line in re.findall(r"^    emafault (.*)$", PAGE, re.M):
-            printed = io.StringIO()
-            with contextlib.redirect_stdout(printed):
-                assert main(line.split()) == 0, line
-            out[line] = printed.getvalue()
+            code, out[line] = pages.run(f"emafault {line}")
+            assert code == 0, line
     return out
 
 
@@ -61,8 +58,6 @@ def test_the_diagnosis_names_the_effect_with_its_size(session, said):
 def test_fault_vectors_of_the_diagnosis(session, said):
     text = next(text for line, text in said.items() if "--diagnosis" in line)
     assert "taken out: cogging" in text and "bench/4.nc" in text
-    from contextlib import chdir
-
     with chdir(session):
         assert main(["identify", "bench/", "--diagnosis", "verdict/diagnosis.json", "--level", "0.5"]) == 0
         assert main(["identify", "healthy/", "--diagnosis", "verdict/diagnosis.json"]) == 2
