@@ -87,13 +87,11 @@ class MachineDiagnoses(Mapping[str, MachineDiagnosis]):
         return json.loads(self._opened.together(self._found))
 
     def table(self) -> Table:
-        """A row a case: kind of verdict, what is named, its posterior probability, the share of the gap that closes."""
+        """A row a case: kind of verdict, what is named, and the share of the gap that closes on what was set aside."""
         rows = [
-            [case, d.kind, " + ".join(d.effects), d.probabilities()[0]["probability"],
-             next((row["closed"] for row in d.gap()), None)]
-            for case, d in self.items()
-        ]  # fmt: skip
-        return Table(["case", "verdict", "effects", "probability", "closed"], rows)
+            [case, d.kind, list(d.effects), next((row["closed"] for row in d.gap()), None)] for case, d in self.items()
+        ]
+        return Table(["case", "verdict", "effects", "closed"], rows)
 
     def write(self, folder: str | Path | None = None, force: bool = False) -> Path:
         """Write ``diagnosis.json`` and ``report.html``, of several cases each in a folder, and give the page's path.
