@@ -46,9 +46,8 @@ def shrinks(
     ladder, explored, fit = held_out.ladder, held_out.explored, held_out.fit
     reading = read(fit.models, fit.search.units.values())
     leading = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
-    left = {u.split(":", 1)[1] for u in told if u.startswith("remainder:")}
-    kept = [c for c in leading.choices if c.unit in told or left & set(fit.search.units[c.unit].equations)]
-    model = fit.search.fit(tuple((c.unit, c.variant) for c in kept))
+    models = _insertable(fit, leading, told)
+    model = models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
     nominal_unit = null(explored)
     recalibrated = {**off, **nominal_unit.values()}
@@ -56,7 +55,7 @@ def shrinks(
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(
-        (_inserted(ladder, explored, fit, m, recalibrated) for m in _insertable(fit, model, told)),
+        (_inserted(ladder, explored, fit, m, recalibrated) for m in models),
         key=lambda found: rms(found[0]),
     )
     at_nominal = ladder.blocks(nominal, remainders=True)
@@ -83,13 +82,16 @@ def shrinks(
     }
 
 
-def _insertable(fit: Fit, model: Model, told: Collection[str]) -> list[Model]:
-    """A set, what of it is told, and that without its remainders: what does not carry over to other recordings is not
-    inserted."""
-    kept = [(c.unit, c.variant) for c in model.choices if c.unit in told]
-    plain = [m for m in kept if not m[0].startswith("remainder:")]
-    others = [m for m in dict.fromkeys((tuple(kept), tuple(plain))) if len(m) < len(model.choices)]
-    return [model, *(fit.search.fit(m) for m in others)]
+def _insertable(fit: Fit, leading: Model, told: Collection[str]) -> list[Model]:
+    """What of a leading set may be inserted: what is told with what stands for a remainder that is; what is told alone;
+    and that without its remainders, which need not carry over to other recordings."""
+    left = {u.split(":", 1)[1] for u in told if u.startswith("remainder:")}
+    acting = {c.unit: {b for e in fit.search.units[c.unit].equations for b in _blocks_of(e)} for c in leading.choices}
+    kept = [c for c in leading.choices if c.unit in told or left & acting[c.unit]]
+    alone = [c for c in kept if c.unit in told]
+    plain = [c for c in alone if not c.unit.startswith("remainder:")]
+    sets = dict.fromkeys(tuple((c.unit, c.variant) for c in some) for some in (kept, alone, plain))
+    return [fit.search.fit(members) for members in sets]
 
 
 def _inserted(
