@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .evidence import Definite, Reduced
+from .evidence import Definite, Normal, Reduced
 from .fit import Bench, Inserted
-from .linear import White, assemble, compressed, disturbance, white_rows
+from .linear import White, assemble, compressed, correct, disturbance, white_rows
 from .model import SETTINGS, Block
 from .point import is_parameter
 
-STEPS = 1  # of a refit of what belongs to a recording alone
+STEPS = 6  # of a refit of what belongs to a recording alone, at most
+STILL = 0.05  # log evidence that one more of them may still promise
 PLACEBOS = 20
 
 
@@ -48,32 +49,39 @@ class Ladder:
             own = f"@{recording}"
             free = [
                 n for n in self.parameters
-                if n.endswith(own) and not n.startswith("controller.")
+                if n.endswith(own) and not n.startswith("controller.timing")
                 and (n in self.nuisances or n.removesuffix(own) in of_each)
             ]  # fmt: skip
             mine, weights = {n: p.off for n, p in self.parameters.items()} | dict(values), self.carried[recording]
-            for step in range(STEPS + 1):
-                last = step == STEPS
+            for _ in range(STEPS):
                 blocks = self.machine.blocks(mine, recording, wanted=[*free, *shaped])
-                whites = [
-                    compressed(b, *self._rows(b, free, remainders and last, inserted), weights.get(b.equation))
-                    for b in blocks
-                ]
-                if last and corrected:
-                    others = self.machine.blocks(mine, recording, disturbed=True, wanted=[])
+                whites = [compressed(b, *self._rows(b, free, False, inserted), weights.get(b.equation)) for b in blocks]
+                if corrected:
+                    others = self.machine.blocks(mine, recording, disturbed=True, wanted=free)
                     for white, block, other in zip(whites, blocks, others, strict=True):
-                        white.own = float(disturbance(block, other, [], weights.get(block.equation))[0, 0])
-                if last:
-                    out += whites
+                        correct(white, disturbance(block, other, white.names, weights.get(block.equation)))
+                if self._step(mine, free, assemble(whites, free, {})) < STILL:
                     break
-                normal = assemble(whites, free, {})
-                sd = np.array([self.parameters[n].sd for n in free])
-                mean = np.array([self.parameters[n].mean - mine[n] for n in free])
-                A = normal.H * np.outer(sd, sd) + np.eye(len(free))
-                right = mean / sd - normal.g * sd
-                for n, d in zip(free, sd * np.linalg.solve(A, right), strict=True):
-                    mine[n] += float(d)
+            blocks = self.machine.blocks(mine, recording, wanted=[*free, *shaped])
+            whites = [
+                compressed(b, *self._rows(b, free, remainders, inserted), weights.get(b.equation)) for b in blocks
+            ]
+            if corrected:
+                others = self.machine.blocks(mine, recording, disturbed=True, wanted=[])
+                for white, block, other in zip(whites, blocks, others, strict=True):
+                    white.own = float(disturbance(block, other, [], weights.get(block.equation))[0, 0])
+            out += whites
         return out
+
+    def _step(self, values: dict[str, float], free: Sequence[str], normal: Normal) -> float:
+        """Moves values by a Gauss-Newton step of what is free; the log evidence that it promised."""
+        sd = np.array([self.parameters[n].sd for n in free])
+        mean = np.array([self.parameters[n].mean - values[n] for n in free])
+        A = normal.H * np.outer(sd, sd) + np.eye(len(free))
+        right = mean / sd - normal.g * sd
+        moved = np.linalg.solve(A, right)
+        values |= {n: values[n] + float(d) for n, d in zip(free, sd * moved, strict=True)}
+        return 0.5 * float(moved @ right)
 
     @staticmethod
     def _rows(
