@@ -78,3 +78,11 @@ def test_a_lag_and_a_strong_effect_are_no_mistakes(plain, shop):
     refuse_mistaken(
         "r.nc", shop.record("sine", {"amplitude": 0.03, "frequency": 2.0}, 70.0, "unknown", strong), shop.actuator
     )
+
+
+def test_a_constant_speed_tells_no_delay_from_the_zero_of_the_angle(shop):
+    """A slow ramp of a unit with strong faults: what little its speed changes must not turn the back-EMFs."""
+    strong = {"fault": (0.081, 0.043, 0.012, -0.177, -0.03), "theta_0": 3.2336, "duration": 0.65}
+    for seed in range(4):
+        slow = shop.record("ramp", {"speed": 0.0504}, 75.0, "unknown", seed=seed, **strong)
+        refuse_mistaken("r.nc", slow, shop.actuator)

@@ -31,6 +31,8 @@ UNBALANCED = 0.35  # of the currents' size, that their sum may be
 OFFSET = 0.05  # of the supply, that a voltage may be off by at rest
 CERTAIN = 6.0  # standard errors
 FROZEN_TURNS, FROZEN = 4.0 * np.pi, 0.05  # electrical rad and s, through which a channel of a phase must change
+LATE = 4  # column of the voltage equation
+LATEST = 5.0  # intervals that the angle may be late by
 MOST_POLE_PAIRS = 20  # that are tried where those told do not turn with the voltages
 LOST = 2.0 * np.pi / 3.0  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 MOVING = 2.0  # rad/s
@@ -218,7 +220,10 @@ def _refuse_pole_pairs(path: str, recording: Recording, actuator: ActuatorParame
 
 
 def _fit(r: Recording, a: ActuatorParameters) -> _Fitted | None:
-    """The voltage equation fitted to the samples in motion; None where they are too few."""
+    """The voltage equation fitted to the samples in motion; None where they are too few.
+
+    The angle may be late by a few intervals; at a constant speed nothing tells that from its zero.
+    """
     theta, dt = r.rotor_angle, r.interval
     middle = 0.5 * (theta[1:] + theta[:-1])
     w = np.diff(theta) / dt
@@ -236,13 +241,23 @@ def _fit(r: Recording, a: ActuatorParameters) -> _Fitted | None:
     columns += [np.ones(len(rhs), complex), 1j * np.ones(len(rhs))]
     A = np.stack([np.concatenate([c.real[moving], c.imag[moving]]) for c in columns], axis=1)
     b = np.concatenate([rhs.real[moving], rhs.imag[moving]])
-    scale = np.sqrt((A**2).mean(axis=0)) + 1e-30
-    solution, *_ = np.linalg.lstsq(A / scale, b, rcond=1e-9)
-    left = float(np.mean((b - A @ (solution / scale)) ** 2))
-    error = np.sqrt(left * np.diag(np.linalg.pinv((A / scale).T @ (A / scale)))) / scale
-    x = solution / scale
+    x, error = _least_squares(A, b)
+    if abs(x[LATE]) > LATEST * a.pole_pairs * dt * abs(complex(x[2], x[3])):
+        A[:, LATE] = 0.0
+        x, error = _least_squares(A, b)
     offset = np.real((x[5] + 1j * x[6]) * np.exp(-1j * AXIS))
     return _Fitted(x[0], error[0], complex(x[2], x[3]), max(error[2:4]), offset, max(error[5:7]))
+
+
+def _least_squares(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of the columns and their standard errors; of a column of zeros both are zero."""
+    scale = np.sqrt((A**2).mean(axis=0))
+    scale[scale == 0.0] = 1.0
+    solution, *_ = np.linalg.lstsq(A / scale, b, rcond=1e-9)
+    left = float(np.mean((b - A @ (solution / scale)) ** 2))
+    spread = np.diag(np.linalg.pinv((A / scale).T @ (A / scale)))
+    error = np.sqrt(left * np.maximum(spread, 0.0)) / scale
+    return solution / scale, error
 
 
 def _vector(phases: np.ndarray) -> np.ndarray:
