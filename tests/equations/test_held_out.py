@@ -1,10 +1,15 @@
 """What a misfit on recordings set aside is compared with."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from emafault.diagnosis.closure import Ladder
 from emafault.diagnosis.fit import NOTHING, Bench
+from emafault.diagnosis.model import Unit
+from emafault.diagnosis.search import Choice, Model
+from emafault.equations.held_out import _less
 
 from .conftest import machine_of, recorded
 
@@ -38,3 +43,19 @@ def test_a_coefficient_that_multiplies_noise_loses_nothing_by_that(ladder):
     before, own, rows = electrical(fixed, values, corrected=True)
     assert part - own > 4.0 * np.sqrt(0.05 * rows)
     assert before - own < raw - part < raw - own
+
+
+def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():
+    explains = {"remainder:electrical_a": 1.0, "remainder:electrical_b": 30.0, "remainder:torque": 50.0}
+
+    def fit(members):
+        value = sum(explains.get(u, 0.0) for u, _ in members)
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), value, 0.0, {}, {})
+
+    units = {"voltage_gain": Unit("voltage_gain", "structural", ("electrical",), [])}
+    search = SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in explains])
+    model = fit((("voltage_gain", 0), ("cogging", 0)))
+    assert set(_less(SimpleNamespace(search=search), model, "voltage_gain", True).units) == {
+        "cogging", "remainder:electrical_b",
+    }  # fmt: skip
+    assert _less(SimpleNamespace(search=search), model, "voltage_gain", False).units == ("cogging",)

@@ -199,13 +199,15 @@ def _dispersed(
 
 
 def _less(whole: Fit, model: Model, unit: str, left: bool) -> Model:
-    """A set less a unit, with a remainder in that one's first equation in its place if asked."""
-    members = [(c.unit, c.variant) for c in model.choices if c.unit != unit]
+    """A set less a unit, with a remainder in its place if asked, in the one of the unit's equations where that explains
+    most."""
+    members = tuple((c.unit, c.variant) for c in model.choices if c.unit != unit)
     equations = whole.search.units[unit].equations if left else ()
-    places = [u for q in equations for u, v in whole.search.candidates if u.startswith(f"remainder:{q}")]
-    if places and not set(places) & {u for u, _ in members}:
-        members.append((places[0], 0))
-    return whole.search.fit(tuple(members))
+    places = {u for q in equations for u, v in whole.search.candidates if u.startswith(f"remainder:{q}")}
+    if not places or places & {u for u, _ in members}:
+        return whole.search.fit(members)
+    found = [whole.search.fit((*members, (p, 0))) for p in sorted(places)]
+    return max(found, key=lambda m: m.log_posterior)
 
 
 def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
