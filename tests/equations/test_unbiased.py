@@ -9,6 +9,8 @@ import pytest
 from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.described import Described, with_forms
 from emafault.diagnosis.whitening import whiten
+from emafault.equations import electrical
+from emafault.equations.point import Point, State
 
 from .conftest import NOISE, machine_of, recorded
 from .test_residuals import truth
@@ -81,3 +83,13 @@ def test_a_large_wave_of_the_recorded_angle_is_undone_in_every_equation():
         ).T  # fmt: skip
         assert left @ left < 0.7 * (before @ before), equation
         assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.95, equation
+
+
+def test_runs_without_end_currents_have_no_period():
+    """Ends at regular phases would alias the ripple into a wave at constant speed."""
+    recording = replace(recorded("parabolic", interval=5e-5), phase_current_end=None)
+    machine = machine_of({"a.nc": recording})
+    state = State(machine.recordings["a.nc"], Point(truth(machine, recording), "a.nc", ()))
+    _, lengths, _ = electrical._runs(state, 0)
+    _, often = np.unique(lengths, return_counts=True)
+    assert often.max() < 0.25 * len(lengths)
