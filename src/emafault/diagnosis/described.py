@@ -250,6 +250,8 @@ def refined(
     for b in blocks if form.channel else [b for b in blocks if b.equation == form.equation]:
         if machine.columns(form, b) is not None:
             acting.setdefault(b.equation, []).extend(without(machine, form, [b], values))
+    if not acting:  # in these recordings
+        return form
     lefts = [Left(e, own, [carried[b.recording][e] for b in own], beside) for e, own in acting.items()]
 
     def value(at: Described) -> float:

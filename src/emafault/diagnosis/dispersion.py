@@ -59,7 +59,7 @@ def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[t
     for name in bench.recordings:
         for block in bench.machine.blocks(bench.values(), name, wanted=set(wanted)):
             weights = bench.carried[name].get(block.equation)
-            if weights is None or not any(n in block.columns for n in wanted):
+            if weights is None:
                 continue
             left = any(n.startswith(f"remainder.{block.equation}.") for n in residual)
             names, rows = white_rows(block, wanted, left, own if block.equation not in SETTINGS else None)

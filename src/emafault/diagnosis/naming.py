@@ -34,6 +34,11 @@ class Reading:
     unknown: float  # mass of sets without listed effect, with a remainder
     verdict: str
 
+    @property
+    def told(self) -> frozenset[str]:
+        """Units that the verdict tells."""
+        return frozenset((*self.named, *(e for g in self.groups for e in g), *self.forms, *self.remainders))
+
 
 def read(
     models: Sequence[Model],

@@ -192,9 +192,8 @@ def _diagnosed(
     verdict["controller"] = _controller(bench, fit, reading, after_values)
     verdict["fault_vector"] = _faults(bench, recordings, before_point, after_values, posterior)
     verdict["biased_outputs"] = _biased(verdict["fault_vector"])
-    told_units = {*reading.named, *(e for g in reading.groups for e in g), *reading.forms, *reading.remainders}
     verdict["shrinks"] = shrinks(
-        bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"], told_units
+        bench, held_out, verdict["fault_vector"], recordings, verdict["discovered"], reading.told
     )
     fitted = [
         {**p, "name": n.split(".", 1)[-1]}
