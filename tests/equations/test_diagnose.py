@@ -45,6 +45,21 @@ def test_nominal_bench_has_no_gap():
     assert sum(e["probability"] for e in verdict["which"]) == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.parametrize(("turns", "sound"), [(0.0, True), (0.05, False)])
+def test_a_unit_that_may_have_no_fault_is_taken_to_have_none_where_that_is_sure(turns, sound):
+    """Turns that all phases miss alike, a unit's k makes up for: nothing else tells that there are none."""
+    recordings = {
+        f"r{n}.nc": recorded(c, None, (turns, 0.0, 0.0, 0.0, 0.0, dT), seed=n, theta_0=theta_0, health="unknown")
+        for n, (c, dT, theta_0) in enumerate(PLANS)
+    }
+    names = list(recordings)
+    found = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE)
+    after = found.verdict["fault_vector"]["r0.nc"]["after"]
+    assert found.bench.sound is sound
+    assert after["Na"]["low"] < turns < after["Na"]["high"]
+    assert (after["Nb"]["high"] - after["Nb"]["low"] < 2e-3) is sound
+
+
 def test_an_effect_is_named_with_its_size(cogging):
     first = cogging["which"][0]
     assert (cogging["verdict"], first["effects"]) == ("explained", ["cogging"])

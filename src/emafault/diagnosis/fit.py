@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from .described import Described, proposed, refined, with_forms
 from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
 from .model import LISTED
+from .naming import NAMED
 from .normal import NormalEquations
 from .point import is_parameter
 from .search import NEAR, OTHER_FORM, Model, Search
@@ -120,6 +122,7 @@ class Bench(NormalEquations):
         self.describe(bench.described)
         self.point |= {n: v for n, v in fit.values.items() if n in self.point}
         self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
+        self.sound = bench.sound
         self.carried |= fit.carried
         # until they are fitted, what the others' fit leaves of further recordings is their noise
         as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
@@ -259,6 +262,18 @@ class Bench(NormalEquations):
         return whites, normal, search
 
     def _search(self, normal: Normal, remainders: bool = True) -> Search:
+        """Sets by the linear model; of a unit that may have no fault, under the prior that it has none where that is
+        sure enough to be named."""
+        found = {}
+        for sound in (False, True) if any(p.absent > 0.0 for p in self.parameters.values()) else (False,):
+            self.sound = sound
+            found[sound] = self._searched(normal, remainders)
+        if len(found) > 1:
+            odds = found[True].ranked()[0].log_posterior - found[False].ranked()[0].log_posterior
+            self.sound = bool(expit(odds) >= NAMED)
+        return found[self.sound]
+
+    def _searched(self, normal: Normal, remainders: bool) -> Search:
         reduced = self.reduce(normal)
         units, candidates = self.candidates(reduced)
         if not remainders:

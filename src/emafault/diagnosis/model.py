@@ -31,6 +31,7 @@ class Parameter:
     secant: Mapping[str, float] | None = None  # values at which a secant stands for a derivative
     fixed: bool = False
     vanishes: float | None = None
+    absent: float = 0.0  # of a fault that the unit may not have: standard deviation about off where it has none
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ class Point:
         self.units: list[Unit] = list(machine.units)
         self.point = {n: p.off for n, p in self.parameters.items()}
         self.on: set[str] = set()
+        self.sound = False  # whether the unit is taken to have none of the faults that it may not have
         self.reach = self.reaches[1]
         of_unit = {p.name for u in self.units for p in u.parameters}
         mine = set(self.recordings)
@@ -81,14 +82,15 @@ class Point:
             return 0.0, OWN_FORM if name.startswith("own.") else 1.0, 0.0
         p = self.parameters[name]
         at = self.point.get(name, p.off)
+        centre, sd = (p.off, p.absent) if self.sound and p.absent > 0.0 else (p.mean, p.sd)
         if p.vanishes is None:
-            return p.mean - at, p.sd, p.off - at
+            return centre - at, sd, p.off - at
         u, factor = self._factor(name)
         if p.alias is not None:  # beyond its tolerance: a factor on its quantity's own
             own = u / factor
-            return -u * np.log(factor), p.sd * u / own, -u * np.log(factor)
-        mean, off = p.mean - p.vanishes, p.off - p.vanishes
-        return u * np.log(mean / factor), p.sd * abs(u / mean), u * np.log(off / factor)
+            return -u * np.log(factor), sd * u / own, -u * np.log(factor)
+        mean, off = centre - p.vanishes, p.off - p.vanishes
+        return u * np.log(mean / factor), sd * abs(u / mean), u * np.log(off / factor)
 
     def _factor(self, name: str) -> tuple[float, float]:
         """What a parameter that multiplies makes with its alias, the unit of its deviations, and its own factor."""

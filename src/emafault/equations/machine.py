@@ -154,7 +154,7 @@ class ReferenceActuator:
                 unknown = True
         if unknown:
             for f in FAULTS:
-                out[f] = _fault(f, f)
+                out[f] = replace(_fault(f, f), absent=0.5 * HEALTHY)
         return out
 
     def _unit(self, effect: Effect) -> Unit:
@@ -173,7 +173,7 @@ class ReferenceActuator:
         for name, q in internal.items():
             full = f"{effect.id}.{name}"
             parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units, vanishes=_vanishes(q.off)))
-            positive.append(_sign(effect, name))
+            positive.append(_sign(effect, name, q.off))
         shapes = _shapes(effect, self.actuator)
         least = max((0.5 * _nearest(effect, n) / q.sd for n, q in internal.items()), default=0.0)
         variants = [Variant(parameters, positive, least)] if not shapes else []
@@ -558,13 +558,14 @@ def _shapes(effect: Effect, actuator: ActuatorParameters) -> list[dict[str, floa
     return [{n: _factor(effect, n, actuator) * x for n, x in shape.items()} for shape in given]
 
 
-def _sign(effect: Effect, name: str) -> int:
-    """+1 or -1 where a parameter's range lies on one side of off."""
+def _sign(effect: Effect, name: str, off: float) -> int:
+    """+1 or -1 where a parameter's range lies on one side of where the fit has it off, which need not be the
+    catalogue's nominal value."""
     p = effect.parameters.get(name)
     if p is None:
         return 1 if name in ("heating_rate", "flexibility") else 0
-    if p.low >= p.nominal and p.high > p.nominal:
+    if p.low >= off and p.high > off:
         return 1
-    if p.high <= p.nominal and p.low < p.nominal:
+    if p.high <= off and p.low < off:
         return -1
     return 0

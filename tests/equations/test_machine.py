@@ -1,0 +1,41 @@
+"""The reference actuator as the diagnosis sees it: its priors, and that a fit stands still at its optimum."""
+
+from emafault.diagnosis.fit import NOTHING, Bench
+from emafault.effects import EFFECTS
+
+from .conftest import machine_of, recorded
+
+FAULT = (0.05, 0.03, 0.06, 0.02, 0.01, 20.0)
+
+
+def test_a_prior_on_one_side_of_off_has_the_whole_range_of_the_catalogue(nominal):
+    """What the fit has off need not be the catalogue's nominal value: a compliance damps with 300, not 0."""
+    for unit in nominal.units:
+        effect = EFFECTS.get(unit.id)
+        for variant in (*unit.variants, *([unit.on] if unit.on else ())) if effect else ():
+            for p, sign in zip(variant.parameters, variant.signs, strict=False):
+                known = effect.parameters.get(p.name.split(".")[-1])
+                if sign != 0 and known is not None:
+                    side = (known.low - p.off, known.high - p.off)
+                    assert min(sign * x for x in side) >= 0.0, p.name
+
+
+def test_a_fit_stands_still_at_its_optimum():
+    """Turns, k, R and L of all phases make up for one another along a line on which noise in the regressors, taken out
+    as it was elsewhere, would drive the point on and on."""
+    plans = (("parabolic", 0.3), ("reversal", 1.1), ("sine", 2.0))
+    named = {
+        f"r{n}": recorded(c, None, FAULT, seed=n, theta_0=theta_0, health="seeded")
+        for n, (c, theta_0) in enumerate(plans)
+    }
+    bench = Bench(machine_of(named), list(named))
+    bench.settle(NOTHING, steps=6)
+    bench.linearise(renew=True)
+    steps = []
+    for _ in range(6):
+        found, normal = bench._fitted(NOTHING)
+        deviations = bench.nuisance_deviations(normal, found.deviations)
+        turns = [n for n in deviations if n.startswith(("N", "seeded.N"))]
+        steps.append(max(abs(deviations[n]) / bench.prior(n)[1] for n in turns))
+        bench.move(found, normal)
+    assert max(steps[2:]) < 1e-5, steps
