@@ -40,7 +40,7 @@ def read(path: Path) -> dict[str, Arrays]:
     return {Path(path).name.split(".")[0]: {name: arrays[name] for name in ("t", "qm", "vir", "gtau")}}
 
 
-def _motion(arrays: Arrays) -> Arrays:
+def filtered_motion(arrays: Arrays) -> Arrays:
     """Filtered force (N), position (m), speed (m/s), acceleration (m/s2), without the filter's ends."""
     t = arrays["t"]
     step = float(np.median(np.diff(t)))
@@ -71,7 +71,7 @@ def recordings(case: str, arrays: Arrays) -> tuple[list[Rows], dict[str, float],
     InputError
         when a cycle is too short to be looked at bin by bin.
     """
-    motion = _motion(arrays)
+    motion = filtered_motion(arrays)
     found = cycles(motion)
     cut = max(1, len(found) // 2)
     first = {key: values[: found[cut - 1].stop] for key, values in motion.items()}
