@@ -513,7 +513,7 @@ def fleet_digest(config: Mapping[str, Any]) -> str:
 
 
 #: what ``snakemake --config`` may set
-CALL = ("experiment", "overrides", "bench", "benches", "twin")
+CALL = ("experiment", "overrides", "bench", "benches", "twin", "calibration")
 
 
 def check_call(call: Mapping[str, Any]) -> None:
@@ -530,12 +530,16 @@ def check_call(call: Mapping[str, Any]) -> None:
     for key, value in call.items():
         if key not in CALL:
             raise InputError(schema.unknown_key(key, "", CALL).replace("the configuration", "--config"))
-        if key in ("bench", "benches", "twin") and not isinstance(value, str):
+        if key in ("bench", "benches", "twin", "calibration") and not isinstance(value, str):
             raise InputError(f"{key}: got {shown(repr(value))}, accepted is one word")
     if call.get("bench"):
         bench_files(call["bench"])
     if call.get("benches"):
         batches(call["benches"])
+    if call.get("calibration"):
+        file_at(call["calibration"], "calibration")
+        if call.get("twin", "actuator") != "actuator":
+            raise InputError("calibration: only probabilities of an actuator are checked, accepted without a twin")
     if call.get("twin", "actuator") != "actuator":
         from .machines.library import stated
 
@@ -585,27 +589,51 @@ def withheld_jobs(draw: str) -> list[tuple[str, int]]:
     return [(rung, n) for rung, count in cases.items() for n in range(-(-count // _of_rung(read["batch"], rung)))]
 
 
-def withheld_spec(draw: str, rung: str, batch: int) -> dict[str, Any]:
-    """What one job of blind cases reads: its seeds, the actuator and the sensors.
+def withheld_spec(draw: str, rung: str, batch: int, config: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """What one job of blind cases reads: its seeds, the actuator with its tolerances and the sensors.
 
     ``again`` are those of T1 that T3 diagnoses too: whole rounds of the effects, spread over the draw. ``told`` are
     diagnosed a second time by a library of the truth alone, ``rivals`` have the distance to the nearest one computed.
+    ``config`` composed is that of the actuator; None takes the reference actuator.
     """
     read = _withheld_draw(draw)
     origin, size = _of_rung(read["first_seed"], rung), _of_rung(read["batch"], rung)
     first = origin + batch * size
     last = min(first + size, origin + read["cases"][rung])
-    config = compose()
+    config = config or compose()
     seeds: dict[str, Any] = {"rung": rung, "first": first, "last": last, "again": []}
     if rung == "T1":
-        effects, cases = len(EFFECTS), read["cases"]
-        apart = max(1, cases["T1"] // max(cases["T3"], 1))  # rounds from one that T3 takes to the next
-        taken = [origin + effects * apart * (n // effects) + n % effects for n in range(cases["T3"])]
+        effects, left_out = len(EFFECTS), read["cases"].get("T3", 0)
+        apart = max(1, read["cases"]["T1"] // max(left_out, 1))  # rounds from one that T3 takes to the next
+        taken = [origin + effects * apart * (n // effects) + n % effects for n in range(left_out)]
         seeds["again"] = [seed for seed in taken if first <= seed < last]
     for name in ("told", "rivals"):
         every = read.get(name, {}).get(rung, 0)
         seeds[name] = [seed for seed in range(first, last) if every and (seed - origin) % every == 0]
-    return recursively_sorted(_pick(config, "actuator", "sensors") | {"seeds": seeds})
+    return recursively_sorted(_pick(config, "actuator", "sensors", "tolerances") | {"seeds": seeds})
+
+
+def calibration_spec(config: Mapping[str, Any], overrides: str | Iterable[str] | None = None) -> dict[str, Any]:
+    """What the check of the probabilities on an actuator reads: the actuator, its name and the cases of the draw."""
+    read = _withheld_draw("own")
+    spec = _pick(config, "actuator", "sensors", "tolerances") | _pick(read, "cases", "first_seed")
+    return recursively_sorted(spec | {"name": actuator_name(overrides)[1]})
+
+
+def actuator_name(overrides: str | Iterable[str] | None = None) -> tuple[str, str]:
+    """Name of a folder and in words of the actuator of a configuration: those of its file, or the reference actuator's.
+
+    Raises
+    ------
+    InputError : a file of an actuator that cannot be used
+    """
+    from .datasheet.compose import of_file
+
+    for text in split_overrides(overrides):
+        key, _, value = text.partition("=")
+        if key == "actuator" and value.endswith((".yaml", ".yml")):
+            return file_name(Path(value).stem), of_file(file_at(value, "actuator")).name
+    return "reference", "reference actuator, 48 V"
 
 
 def _evidence() -> dict[str, Any]:

@@ -15,14 +15,14 @@ def asked(monkeypatch):
     """What is asked of the diagnosis, by bench, and benches and keys that hold nothing."""
     calls = []
 
-    def make(rung, seeds, folder, actuator, noise, rivals=False):
+    def make(rung, seeds, folder, actuator, noise, rivals, population):
         for case in companions(rung, seeds[0]):
             (folder / "benches" / case.bench).mkdir(parents=True, exist_ok=True)
             (folder / "benches" / case.bench / "recording_0.nc").write_text("")
             (folder / "keys").mkdir(exist_ok=True)
             (folder / "keys" / f"{case.name}.json").write_text(json.dumps({"case": case.to_dict()}))
 
-    def diagnose(bench, actuator, noise, exclude):
+    def diagnose(bench, actuator, noise, exclude, tolerances):
         assert (bench / "recording_0.nc").exists()
         calls.append((bench.name, tuple(exclude)))
         if len(exclude) == 1:

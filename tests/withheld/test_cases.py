@@ -14,13 +14,17 @@ from emafault.actuator.fixed_step import simulate_fixed_step
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise
 from emafault.config import reference_actuator, withheld_jobs, withheld_spec
+from emafault.datasheet.compose import of_file
 from emafault.effects import EFFECTS
+from emafault.effects.scaling import scaled
 from emafault.errors import InputError
 from emafault.io.recording import read_recording
 from emafault.withheld.benches import STEP, make_cases, rival_distances, simulate_truth, write_bench
 from emafault.withheld.cases import RUNGS, STRATA, case_from_dict, draw_case, plain_twin, stratum_of
 from emafault.withheld.detectability import Detector
 from emafault.withheld.disturbances import DISTURBANCES
+from emafault.withheld.population import REFERENCE, population_of
+from emafault.withheld.statistics import runs_of
 
 NOISE = SensorNoise(0.05, 0.005, 0.02, 0.3, 1e-4, 1e-5, 0.05, 0.5)
 IDS = list(EFFECTS)
@@ -244,3 +248,52 @@ def test_turns_shorted_in_all_phases_are_known_as_well_as_the_units_k_without_a_
     found = Detector(case, reference_actuator(), NOISE, simulate_truth(case, reference_actuator())).detectability()
     turns = 0.1 * np.array(found.fault_sd[0][:3])  # of the range
     assert np.all((turns > 0.003) & (turns < 0.006))
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "actuators"
+OWN = {path.stem: of_file(path) for path in sorted(EXAMPLES.glob("*.yaml"))}
+
+
+@pytest.mark.parametrize("machine", OWN.values(), ids=OWN)
+def test_cases_of_an_actuator_of_ones_own_are_of_its_sizes(machine):
+    actuator, tolerances = machine.actuator, machine.tolerances()
+    population = population_of(actuator, tolerances)
+    catalogue = scaled(actuator, tolerances)
+    output_speed = actuator.speed_limit / actuator.gear_ratio
+    for seed in range(len(IDS)):
+        case = draw_case("T1", seed, population)
+        assert case == draw_case("T1", seed, population)
+        (effect,) = case.effects
+        for name, value in case.effects[effect].items():
+            p = catalogue[effect].parameters[name]
+            assert min(p.low, p.nominal) - 1e-12 <= value <= max(p.high, p.nominal) * (1 + 1e-9)
+        assert case.tolerances["bus_voltage"]["Vdc"] == pytest.approx(actuator.bus_voltage, rel=0.1)
+        for plan in case.recordings:
+            _, command = runs_of(actuator, plan, [case.unit()], np.array([plan.fault]))
+            speed = np.abs(np.diff(command)) / actuator.control_period
+            assert np.max(np.abs(command)) < actuator.end_stop
+            if plan.command != "step":
+                assert speed.max() < output_speed
+
+
+def test_what_shows_on_an_actuator_of_ones_own_is_told_by_its_own_catalogue(tmp_path):
+    machine = OWN["hinge_28v"]
+    population = population_of(machine.actuator, machine.tolerances())
+    seed = seed_of("load_constant", 15)
+    (name,) = make_cases("T1", [seed], tmp_path, machine.actuator, NOISE, population=population)
+    key = json.loads((tmp_path / "keys" / f"{name}.json").read_text())
+    assert key["tolerances"] == machine.tolerances() and key["actuator"]["gear_ratio"] == 120
+    assert key["detectability"]["members"]["load_constant"] > 25.0
+    assert rival_distances(key, ["cogging"])["cogging"] > 25.0
+
+
+def test_the_reference_actuator_from_a_file_without_tolerances_is_itself():
+    assert population_of(reference_actuator()) is REFERENCE
+    assert population_of(reference_actuator(), {"inertia": {"scale": 0.3}}) is not REFERENCE
+
+
+def test_rungs_of_the_reference_actuator_alone_are_refused_for_another():
+    machine = OWN["hinge_28v"]
+    population = population_of(machine.actuator, machine.tolerances())
+    with pytest.raises(InputError, match="rung: got 'T7', accepted for an actuator of one's own are T0, T1, T2, T3"):
+        draw_case("T7", 0, population)

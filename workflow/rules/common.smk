@@ -232,6 +232,8 @@ def data_of_case(wildcards):
 BENCH = str(config.get("bench", "")).rstrip("/")
 DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
 WITHHELD = f"{RESULTS}/withheld"
+CALIBRATED = configuration.actuator_name(config.get("overrides", ""))[0]
+CALIBRATION = f"{RESULTS}/calibration/{CALIBRATED}"
 BENCHES = str(config.get("benches", "")).rstrip("/")
 FLEET_NAME = configuration.bench_name(BENCHES)
 FLEET = f"{RESULTS}/fleets/{FLEET_NAME}"
@@ -257,6 +259,20 @@ def fleet_batches(wildcards):
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
     return [f"{FLEET}/batch_{n}.parquet" for n in range(number)]
+
+
+def calibration_spec(wildcards):
+    return configuration.calibration_spec(PLAN.cases[0].config, config.get("overrides", ""))
+
+
+def code_of_calibration(wildcards):
+    """Digest of what the cases of an actuator depend on, which names their folder."""
+    return provenance.digest_of(calibration_spec(wildcards), code("diagnose_cases"))
+
+
+def calibration_batches(wildcards):
+    """Files of every job of an actuator's cases."""
+    return [f"{CALIBRATION}/{rung}_{n}.json" for rung, n in configuration.withheld_jobs("own")]
 
 
 def withheld_measured(wildcards):

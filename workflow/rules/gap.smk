@@ -8,6 +8,7 @@
 rule diagnose_gap:
     input:
         files=bench_files,
+        calibration=config.get("calibration") or [],
         compiled=rules.compile_simulation.output,
     output:
         verdict=f"{DIAGNOSIS}/diagnosis.json",

@@ -12,6 +12,6 @@ with one_line_errors(snakemake.log[0]):
     bench = Path(snakemake.input.files[0])
     bench = bench.parent if params.is_folder else bench
     if params.twin == "actuator":
-        diagnose_folder(bench, params.spec, out)
+        diagnose_folder(bench, params.spec, out, calibration=snakemake.input.get("calibration") or None)
     else:
         diagnose_file(bench, params.twin, params.spec, out)

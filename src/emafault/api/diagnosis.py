@@ -95,6 +95,7 @@ def diagnose(
     actuator: Actuator | None = None,
     exclude: Sequence[str] = (),
     twin: None = None,
+    calibration: str | Path | None = None,
 ) -> Diagnosis: ...
 @overload
 def diagnose(
@@ -109,6 +110,7 @@ def diagnose(
     actuator: Actuator | None = None,
     exclude: Sequence[str] = (),
     twin: str | Path | None = None,
+    calibration: str | Path | None = None,
 ) -> Diagnosis | MachineDiagnoses:
     """Diagnose recordings of one actuator, or of a measured machine, as ``emafault diagnose`` does.
 
@@ -118,6 +120,7 @@ def diagnose(
     actuator : the nominal one; None takes the reference actuator
     exclude : effects of the catalogue to leave out
     twin : name of the measured machine that they come from, or a Python file that states one
+    calibration : ``calibration.json`` of the actuator, which ``snakemake calibration`` writes
 
     Raises
     ------
@@ -128,8 +131,10 @@ def diagnose(
             raise InputError(f"recordings: got {shown(repr(recordings))}, accepted with a twin is the path of its file")
         if actuator is not None:
             raise InputError("actuator: a measured machine has none, accepted is either an actuator or a twin")
+        if calibration is not None:
+            raise InputError("calibration: only probabilities of an actuator are checked, accepted without a twin")
         return diagnose_machine(recordings, twin, exclude)
     given = recordings_of(recordings)
     actuator = actuator or Actuator.reference()
     bench = check_bench(given.name, dict(given), actuator.parameters)
-    return Diagnosis(run.diagnose_bench(bench, actuator.spec, exclude), bench)
+    return Diagnosis(run.diagnose_bench(bench, actuator.spec, exclude, calibration), bench)

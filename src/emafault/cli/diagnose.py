@@ -32,6 +32,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--corrected", metavar="DIR", help="write the recordings with the faults of their measuring chain undone to DIR"
     )
+    parser.add_argument(
+        "--calibration", metavar="FILE", help="calibration.json of the actuator, which snakemake calibration writes"
+    )
     parser.add_argument("--force", action="store_true", help="replace files that are not of this bench's diagnosis")
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
@@ -63,12 +66,15 @@ def run(args: argparse.Namespace) -> None:
     if actuator:
         from ..equations.run import diagnose_folder
 
-        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, args.corrected, args.force)
+        more = args.corrected, args.force, args.calibration
+        diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, *more)
         if args.corrected:
             print(identified(args.path, args.corrected, args.actuator))
     else:
         if args.corrected:
             raise InputError("--corrected: only recordings of the actuator can be corrected")
+        if args.calibration:
+            raise InputError("--calibration: only probabilities of an actuator are checked, accepted without --twin")
         if target is not None:
             raise InputError("--experiment: a measured machine has no simulator that could run one")
         from ..machines.run import diagnose_file

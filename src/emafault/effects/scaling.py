@@ -73,6 +73,11 @@ def _friction(actuator: Any) -> float:
     return max(actuator.coulomb_friction, LEAST_FRICTION * torque)
 
 
+def reference() -> dict[str, Any]:
+    """Parameters of the reference actuator."""
+    return yaml.safe_load((CONF / "actuator" / "reference.yaml").read_text(encoding="utf-8"))
+
+
 @cache
 def _of_reference(name: str) -> float:
     return SCALES[name](_reference())
@@ -82,4 +87,4 @@ def _of_reference(name: str) -> float:
 def _reference() -> Any:
     from types import SimpleNamespace
 
-    return SimpleNamespace(**yaml.safe_load((CONF / "actuator" / "reference.yaml").read_text(encoding="utf-8")))
+    return SimpleNamespace(**reference())

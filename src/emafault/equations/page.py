@@ -12,6 +12,7 @@ from ..reporting.page import Page
 from ..reporting.panels import Panel
 from ..reporting.retrained import MARKS
 from .electrical import NAMES
+from .probabilities import basis
 from .quality import in_cells
 from .telling import differing_gains
 from .terms import TERMS
@@ -164,6 +165,8 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
         "what the validation recordings, or another size in each recording, speak against has lost its probability all "
         "the same."
     )
+    if "calibration" in verdict:
+        about += f" {basis(verdict['calibration'])}"
     entries = ranked(verdict)
     page.figure(
         "which", figures.draw_ranking(entries), about,

@@ -21,6 +21,7 @@ from .diagnose import Diagnosed, diagnose
 from .fitted import numbers
 from .handover import experiment_text
 from .page import Detail, draw, finding
+from .probabilities import checked_on
 
 PROCESSES = 2
 
@@ -34,6 +35,7 @@ def diagnose_folder(
     track: bool = True,
     corrected: str | Path | None = None,
     force: bool = True,
+    calibration: str | Path | None = None,
 ) -> dict:
     """Diagnose a folder of recordings; write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
@@ -46,6 +48,7 @@ def diagnose_folder(
     corrected : new folder for the recordings with the faults of their measuring chain undone
     track : whether to log an MLflow run; one that fails is said so and breaks nothing
     force : whether files in ``out`` that are not of a diagnosis of this bench may be replaced
+    calibration : check of the probabilities on this actuator, see ``probabilities``
 
     Raises
     ------
@@ -56,7 +59,7 @@ def diagnose_folder(
     refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
     if corrected is not None:
         new_folder(path, corrected, "--corrected")
-    bench, found = diagnosed(path, spec, exclude)
+    bench, found = diagnosed(path, spec, exclude, calibration)
     verdict = found.verdict
     with aside(track) as tracked:
         write(found, bench, folder, experiment)
@@ -68,7 +71,9 @@ def diagnose_folder(
     return verdict
 
 
-def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> tuple[Bench, Diagnosed]:
+def diagnosed(
+    path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] = (), calibration: str | Path | None = None
+) -> tuple[Bench, Diagnosed]:
     """A folder of recordings read and diagnosed, what was found printed.
 
     Raises
@@ -76,27 +81,32 @@ def diagnosed(path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] 
     InputError : recordings or effects that cannot be used
     """
     bench = read_bench(path, ActuatorParameters(**spec["actuator"]))
-    found = diagnose_bench(bench, spec, exclude)
+    found = diagnose_bench(bench, spec, exclude, calibration)
     print("\n".join(finding(found.verdict)), flush=True)
     return bench, found
 
 
-def diagnose_bench(bench: Bench, spec: Mapping[str, Any], exclude: Sequence[str] = ()) -> Diagnosed:
+def diagnose_bench(
+    bench: Bench, spec: Mapping[str, Any], exclude: Sequence[str] = (), calibration: str | Path | None = None
+) -> Diagnosed:
     """Diagnose recordings that have been read and checked.
 
     Parameters
     ----------
     spec : ``actuator``, ``sensors`` and ``tolerances`` of a composed configuration
     exclude : effects that the library is to lack
+    calibration : check of the probabilities on this actuator, see ``probabilities``
 
     Raises
     ------
-    InputError : an effect that does not exist
+    InputError : an effect that does not exist, or a check of another actuator
     """
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
+    checked_by = checked_on(actuator, calibration)  # before the work, not after it
     split = split_bench(bench.recordings)
     found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, spec["tolerances"])
     found.verdict["warnings"] = bench.warnings
+    found.verdict["calibration"] = checked_by
     return found
 
 

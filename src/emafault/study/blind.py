@@ -22,6 +22,7 @@ from ..io.split import split_bench
 from ..reporting.written import to_json
 from ..withheld.benches import make_cases, write_key_without
 from ..withheld.cases import Case, draw_case, with_twin, without_effect
+from ..withheld.population import REFERENCE, Population, population_of
 
 #: cases looked at while developing stand above this seed, those of the scoreboards below
 DEVELOPMENT = 1_000_000
@@ -39,6 +40,7 @@ def run_cases(
     again: Collection[int] = (),
     told: Collection[int] = (),
     rivals: Collection[int] = (),
+    population: Population = REFERENCE,
 ) -> list[str]:
     """Make, diagnose and keep the verdicts of a rung's seeds; what is there already is left alone.
 
@@ -49,6 +51,7 @@ def run_cases(
     again : seeds of T1 that are also diagnosed with the effect left out of the library: T3, on the same bench
     told : seeds that are also diagnosed with a library of the true effects alone: ``FOLDER/oracles/NAME``
     rivals : seeds whose keys hold the distance to the nearest rival
+    population : units of the actuator
 
     Returns
     -------
@@ -56,7 +59,7 @@ def run_cases(
     """
     names = []
     for seed in seeds:
-        cases = companions(rung, seed, seed in again)
+        cases = companions(rung, seed, seed in again, population)
         names += [c.name for c in cases]
         wanted: dict[Path, tuple[Case, Sequence[str]]] = {}
         for case in cases:
@@ -72,14 +75,14 @@ def run_cases(
         for case in cases:
             if not benches[case.bench].exists():
                 keys[case.name].unlink(missing_ok=True)
-        make_cases(rung, [seed], folder, actuator, noise, seed in rivals)
+        make_cases(rung, [seed], folder, actuator, noise, seed in rivals, population)
         for case in cases:
             if case.left_out:
                 write_key_without(keys[cases[0].name], keys[case.name])
         for path in missing:
             case, exclude = wanted[path]
             try:
-                verdict = diagnose_bench(benches[case.bench], actuator, noise, exclude)
+                verdict = diagnose_bench(benches[case.bench], actuator, noise, exclude, population.tolerances)
             except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
                 verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
             text = to_json(verdict | {"bench": case.name})
@@ -92,10 +95,15 @@ def run_cases(
     return names
 
 
-def companions(rung: str, seed: int, again: bool = False) -> list[Case]:
+def companions(rung: str, seed: int, again: bool = False, population: Population = REFERENCE) -> list[Case]:
     """The case of a seed and what is diagnosed with it: its case of T3, or its plain twin."""
-    case = draw_case(rung, seed)
+    case = draw_case(rung, seed, population)
     return [case, without_effect(case)] if again else list(with_twin(case))
+
+
+def folder_of(output: Path, code: str) -> Path:
+    """Folder of the cases of a draw, beside what its jobs write."""
+    return output.parent / f"cases_{code[:8]}"
 
 
 def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
@@ -104,17 +112,22 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
     Cases are kept per version of the code: a killed job goes on where it was, one whose code changed starts anew.
     """
     seeds = spec["seeds"]
-    folder = output.parent / f"cases_{code[:8]}"
+    folder = folder_of(output, code)
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
+    population = population_of(actuator, spec["tolerances"])
     span = range(seeds["first"], seeds["last"])
     beside = {name: seeds[name] for name in ("again", "told", "rivals")}
-    names = run_cases(seeds["rung"], span, folder, actuator, noise, **beside)
+    names = run_cases(seeds["rung"], span, folder, actuator, noise, **beside, population=population)
     text = json.dumps({"folder": folder.name, "cases": names})
     write_text(output, text)
 
 
 def diagnose_bench(
-    bench: Path, actuator: ActuatorParameters, noise: SensorNoise, exclude: Sequence[str] = ()
+    bench: Path,
+    actuator: ActuatorParameters,
+    noise: SensorNoise,
+    exclude: Sequence[str] = (),
+    tolerances: Mapping[str, Mapping[str, float]] | None = None,
 ) -> dict[str, Any]:
     """The verdict on a bench, without report or next experiment.
 
@@ -123,4 +136,6 @@ def diagnose_bench(
     InputError : recordings that cannot be used
     """
     brought = read_bench(bench, actuator)
-    return diagnose(brought.name, brought.recordings, split_bench(brought.recordings), actuator, noise, exclude).verdict
+    split = split_bench(brought.recordings)
+    found = diagnose(brought.name, brought.recordings, split, actuator, noise, exclude, tolerances=tolerances)
+    return found.verdict

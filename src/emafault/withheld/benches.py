@@ -20,6 +20,7 @@ from ..io.recording import Recording, write_recording
 from .cases import Case, case_from_dict, draw_case, is_disturbed, plain_twin, with_twin, without_effect
 from .detectability import LATTICE, Detector
 from .disturbances import FILTER, Unlisted, change, in_physics, terms_of, with_controller
+from .population import REFERENCE, Population, population_of
 from .statistics import runs_of, simulate_plans
 
 STEP = 2e-6  # s, of the other integrator
@@ -32,6 +33,7 @@ def make_cases(
     actuator: ActuatorParameters,
     noise: SensorNoise,
     rivals: bool = False,
+    population: Population = REFERENCE,
 ) -> list[str]:
     """Make the benches and keys of a rung's seeds; what is there already is left alone.
 
@@ -48,13 +50,13 @@ def make_cases(
     """
     names = []
     for seed in seeds:
-        case = draw_case(rung, int(seed))
+        case = draw_case(rung, int(seed), population)
         for one in with_twin(case):
             names.append(one.name)
             key = Path(folder) / "keys" / f"{one.name}.json"
             if not key.exists():
                 signals = write_bench(one, Path(folder) / "benches" / one.bench, actuator, noise)
-                write_key(one, key, actuator, noise, signals, rivals)
+                write_key(one, key, actuator, noise, signals, rivals, population)
     return names
 
 
@@ -117,8 +119,9 @@ def write_bench(
 
 
 def write_key(
-    case: Case, path: Path, actuator: ActuatorParameters, noise: SensorNoise, truth, rivals: bool = False
-) -> None:
+    case: Case, path: Path, actuator: ActuatorParameters, noise: SensorNoise, truth, rivals: bool = False,
+    population: Population = REFERENCE,
+) -> None:  # fmt: skip
     """Write the truth of a case, with its detectability where it holds an effect or something unlisted.
 
     Distances of effects are those of the plain bench; one of something unlisted is from that bench to the same one with
@@ -126,10 +129,11 @@ def write_key(
     """
     key: dict = {"case": case.to_dict(), "detectability": None, "fault_sd": None, "nearest_rival": None}
     key["actuator"], key["noise"] = asdict(actuator), asdict(noise)
+    key["tolerances"] = population.tolerances
     if case.effects or case.unlisted:
         plain = plain_twin(case)
         signals = simulate_truth(plain, actuator) if is_disturbed(case) else truth
-        detector = Detector(plain, actuator, noise, signals)
+        detector = Detector(plain, actuator, noise, signals, population)
     if case.effects:
         found = detector.detectability()
         key["detectability"] = {"nominal": found.nominal, "members": found.members}
@@ -180,6 +184,7 @@ def rival_distances(key: dict, rivals: Iterable[str]) -> dict[str, float]:
         return {}
     case = plain_twin(case_from_dict(key["case"]))
     actuator, noise = ActuatorParameters(**key["actuator"]), SensorNoise(**key["noise"])
-    detector = Detector(case, actuator, noise, simulate_truth(case, actuator))
+    population = population_of(actuator, key.get("tolerances"))
+    detector = Detector(case, actuator, noise, simulate_truth(case, actuator), population)
     distance = detector.distance_to if len(case.effects) == 1 else detector.distance_in_place
     return {rival: distance(rival) for rival in wanted}

@@ -12,11 +12,14 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from ..effects import EFFECTS
+from ..effects import EFFECTS, Effect
 from ..errors import InputError
 from .disturbances import FILTER, Unlisted, draw_controller, draw_unlisted, in_physics
+from .population import REFERENCE, Population
 
 RUNGS = ("T0", "T1", "T2", "T3", "T4", "T7", "T8", "T9")
+#: rungs that are drawn for any actuator; what the others hold has the reference actuator's sizes
+OWN_RUNGS = ("T0", "T1", "T2", "T3")
 FIRST = 5  # rungs that there were before the others; their noise keeps its seeds
 #: of ten seeds of T7: how many effects and how many things unlisted
 MIXES = ((1, 1),) * 5 + ((2, 1),) * 2 + ((1, 2),) * 2 + ((2, 2),)
@@ -59,6 +62,8 @@ HEALTH_MIXES = (
 HEALTH_ODDS = (0.15, 0.30, 0.20, 0.20, 0.05, 0.10)
 INTERVALS = (5e-5, 1e-4, 2e-4, 2.5e-4, 4e-4, 5e-4, 1e-3)  # s
 INTERVAL_ODDS = (0.08, 0.17, 0.40, 0.10, 0.08, 0.10, 0.07)
+LEAST_UNIT = 0.2  # of the nominal value, that a unit has however wide the tolerance
+LENGTHS = ("acceleration", "amplitude", "speed")  # settings of a command that go with the reach of an actuator
 
 
 @dataclass(frozen=True)
@@ -139,17 +144,19 @@ def _opaque(rung: str, seed: int, plain: bool) -> str:
     return hashlib.sha256(f"{rung} {seed} {plain}".encode()).hexdigest()[:12]
 
 
-def draw_case(rung: str, seed: int) -> Case:
-    """Draw the case of a rung and seed.
+def draw_case(rung: str, seed: int, population: Population = REFERENCE) -> Case:
+    """Draw the case of a rung and seed, of the units of an actuator.
 
     Raises
     ------
-    InputError : an unknown rung
+    InputError : an unknown rung, or one that is of the reference actuator alone
     """
     if rung not in RUNGS:
         raise InputError(f"rung: got '{rung}', accepted are {', '.join(RUNGS)}")
+    if population is not REFERENCE and rung not in OWN_RUNGS:
+        raise InputError(f"rung: got '{rung}', accepted for an actuator of one's own are {', '.join(OWN_RUNGS)}")
     if rung == "T3":
-        return without_effect(draw_case("T1", seed))
+        return without_effect(draw_case("T1", seed, population))
     rng = np.random.default_rng([RUNGS.index(rung), seed])
     ids = list(EFFECTS)
     effects: dict[str, dict[str, float]] = {}
@@ -163,7 +170,7 @@ def draw_case(rung: str, seed: int) -> Case:
         kind = seed % 10  # five of ten hold two effects, two hold three, three hold one with strong faults
         strong = kind >= 7
         for effect in rng.choice(ids, size=1 if strong else 2 if kind < 5 else 3, replace=False):
-            effects[str(effect)] = draw_effect(str(effect), 10.0 ** rng.uniform(-1.0, 0.0), rng)
+            effects[str(effect)] = draw_effect(str(effect), 10.0 ** rng.uniform(-1.0, 0.0), rng, population.catalogue)
     elif rung in ("T7", "T8", "T9"):
         if rung == "T9":
             controller, number = draw_controller(seed // 2, rng), seed % 2
@@ -179,13 +186,13 @@ def draw_case(rung: str, seed: int) -> Case:
         stratum = stratum_of(seed, rung)
         smallest = SMALLEST.get(effect, USUAL_SMALLEST)
         amplitude = smallest ** (1.0 - (stratum + rng.random()) / STRATA[rung])
-        effects[effect] = draw_effect(effect, amplitude, rng)
+        effects[effect] = draw_effect(effect, amplitude, rng, population.catalogue)
     return Case(
         rung=rung,
         seed=seed,
         effects=effects,
-        tolerances=draw_tolerances(rng),
-        recordings=draw_bench(strong, rng),
+        tolerances=draw_tolerances(rng, population.catalogue),
+        recordings=draw_bench(strong, rng, population.reach),
         noise_scale={c: float(s) for c, s in _noise_scale(rng).items()},
         end_current=bool(rng.random() > 0.15),
         bus_voltage=bool(rng.random() > 0.15),
@@ -243,28 +250,30 @@ def stratum_of(seed: int, rung: str) -> int:
     return (turn + 7 * effect) % STRATA[rung]
 
 
-def draw_tolerances(rng: np.random.Generator) -> dict[str, dict[str, float]]:
+def draw_tolerances(rng: np.random.Generator, catalogue: Mapping[str, Effect] = EFFECTS) -> dict[str, dict[str, float]]:
     """Values of the calibration parameters of a unit within its specification."""
     return {
         effect.id: {
-            name: p.nominal * (1.0 + p.tolerance * float(rng.standard_normal()))
+            name: p.nominal * max(1.0 + p.tolerance * float(rng.standard_normal()), LEAST_UNIT)
             for name, p in effect.parameters.items()
             if p.tolerance > 0.0
         }
-        for effect in EFFECTS.values()
+        for effect in catalogue.values()
         if effect.kind == "calibration"
     }
 
 
-def draw_effect(effect: str, amplitude: float, rng: np.random.Generator) -> dict[str, float]:
+def draw_effect(
+    effect: str, amplitude: float, rng: np.random.Generator, catalogue: Mapping[str, Effect] = EFFECTS
+) -> dict[str, float]:
     """Draw the parameters of one effect.
 
     ``amplitude`` is the fraction of the realistic maximum that the largest of its parameters takes; one whose realistic
     range starts away from zero goes log-uniformly over that range instead. A calibration effect has no amplitude: at
     least one parameter is outside four sigma.
     """
-    parameters = EFFECTS[effect].parameters
-    if EFFECTS[effect].kind == "calibration":
+    parameters = catalogue[effect].parameters
+    if catalogue[effect].kind == "calibration":
         while True:
             values = {n: float(rng.uniform(p.low, p.high)) for n, p in parameters.items()}
             if any(abs(values[n] - p.nominal) > 4.0 * p.tolerance * abs(p.nominal) for n, p in parameters.items()):
@@ -290,8 +299,11 @@ def draw_effect(effect: str, amplitude: float, rng: np.random.Generator) -> dict
     return values
 
 
-def draw_bench(strong: bool, rng: np.random.Generator) -> tuple[RecordingPlan, ...]:
-    """Draw four to eight recordings: commands, lengths, intervals, soak temperatures and states of health."""
+def draw_bench(strong: bool, rng: np.random.Generator, reach: float = 1.0) -> tuple[RecordingPlan, ...]:
+    """Draw four to eight recordings: commands, lengths, intervals, soak temperatures and states of health.
+
+    ``reach`` multiplies the speeds and lengths of the commands.
+    """
     count = int(rng.integers(4, 9))
     mix = HEALTH_MIXES[rng.choice(len(HEALTH_MIXES), p=HEALTH_ODDS)]
     if strong and mix == ("healthy",):
@@ -321,7 +333,7 @@ def draw_bench(strong: bool, rng: np.random.Generator) -> tuple[RecordingPlan, .
         plans.append(
             RecordingPlan(
                 command=command,
-                settings=settings,
+                settings={k: v * reach if k in LENGTHS else v for k, v in settings.items()},
                 duration=interval * round(duration / interval),
                 interval=interval,
                 health=state,

@@ -12,8 +12,9 @@ from scipy.optimize import lsq_linear
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
-from ..effects import EFFECTS
+from ..effects import EFFECTS, Effect
 from .cases import Case
+from .population import REFERENCE, Population
 from .statistics import Unit, View, coarser, less, simulate_plan, simulate_plans
 
 LATTICE = 1e6  # squared distance by which rounded values differ from unrounded ones: one look at them tells
@@ -50,12 +51,15 @@ class Detector:
         actuator: ActuatorParameters,
         noise: SensorNoise,
         truth: Sequence[Mapping[str, np.ndarray]],
+        population: Population = REFERENCE,
     ):
         self.case, self.actuator = case, actuator
+        catalogue = population.catalogue
+        self.coordinates = {effect: Coordinates(effect, catalogue) for effect in catalogue}
         self.unit = {k: dict(v) for k, v in case.tolerances.items()}
         self.tolerances = [
             (e.id, n, p.tolerance * abs(p.nominal))
-            for e in EFFECTS.values()
+            for e in catalogue.values()
             for n, p in e.parameters.items()
             if e.kind == "calibration" and p.tolerance > 0.0
         ]
@@ -179,7 +183,7 @@ class Detector:
         beside: Unit | None = None,
     ) -> np.ndarray:
         """Derivatives of all statistics by an effect's coordinates about ``at``, (statistic, coordinate)."""
-        coordinates, others = COORDINATES[effect], beside or {}
+        coordinates, others = self.coordinates[effect], beside or {}
         if there is None:
             there = self.shift(x, {**others, effect: coordinates.values(at)})
         columns = []
@@ -198,7 +202,7 @@ class Detector:
         differ by is taken off.
         """
         lattice = 0.0 if effect == "speed_quantisation" else self.lattice
-        coordinates = COORDINATES[effect] if effect and effect != "speed_quantisation" else None
+        coordinates = self.coordinates[effect] if effect and effect != "speed_quantisation" else None
         x = np.zeros(len(self.prior))
         at = coordinates.start.copy() if coordinates else np.zeros(0)
 
@@ -282,14 +286,14 @@ class Detector:
         if not effects:
             return max(0.0, self.squared(shift) - self.repeat)
         truth = self.case.effects
-        design = np.concatenate([self.columns(e, COORDINATES[e].point(truth[e])) for e in effects], 1)
+        design = np.concatenate([self.columns(e, self.coordinates[e].point(truth[e])) for e in effects], 1)
         return max(0.0, self.linear_distance(shift, design) - self.repeat)
 
     def linear_rival(self, effect: str) -> float:
         """First-order squared distance from the truth to an effect: quick, and too large for strong truths."""
         if effect == "speed_quantisation":
             return self.squared(self.delta) + self.lattice
-        return self.linear_distance(self.delta, self.columns(effect, COORDINATES[effect].start)) + self.lattice
+        return self.linear_distance(self.delta, self.columns(effect, self.coordinates[effect].start)) + self.lattice
 
     def distance_in_place(self, effect: str) -> float:
         """Squared distance from a truth of several effects to the nearest with this one in place of one of them, the
@@ -308,7 +312,7 @@ class Detector:
             if np.max(np.abs(moved)) < LINEAR:  # a fit by derivatives that scatter stops on its way
                 nominal = min(nominal, linear)
         members = {e: LATTICE for e in self.case.effects if e not in effects}
-        design = {e: self.columns(e, COORDINATES[e].point(self.case.effects[e])) for e in effects}
+        design = {e: self.columns(e, self.coordinates[e].point(self.case.effects[e])) for e in effects}
         for effect in effects:
             others = [e for e in effects if e != effect]
             if not others:
@@ -346,29 +350,32 @@ def _bounded(information: np.ndarray, gradient: np.ndarray, low: np.ndarray, hig
 #: effects that have no meaning or no stable loop much outside their ranges
 KEPT_IN_RANGE = ("back_emf_shape", "compliance", "dynamic_eccentricity", "speed_latency", "stribeck", "virtual_neutral")
 
+#: effects that vanish at a point of their own: smallest values and those that a fit begins with, reference actuator
+BEGUN = {"stribeck": ((0.0, 1.0), (0.005, 6.0)), "compliance": ((2e3, 200.0), (1e4, 300.0))}
+
 
 class Coordinates:
     """Smooth coordinates in which an effect is fitted: its parameters, or what replaces them where singular."""
 
-    def __init__(self, effect: str):
+    def __init__(self, effect: str, catalogue: Mapping[str, Effect] = EFFECTS):
         self.effect = effect
-        parameters = EFFECTS[effect].parameters
+        parameters = catalogue[effect].parameters
         self.names = [n for n in parameters if (effect, n) != ("self_heating", "Rth")]
         chosen = [parameters[n] for n in self.names]
         self.low = np.array([min(p.low, p.nominal) for p in chosen])
         self.high = np.array([max(p.high, p.nominal) for p in chosen])
         self.off = np.array([p.nominal for p in chosen])
-        if EFFECTS[effect].kind == "structural" and effect not in KEPT_IN_RANGE:
+        if catalogue[effect].kind == "structural" and effect not in KEPT_IN_RANGE:
             # beyond the realistic range as well: data that cannot tell two effects apart are not helped by a range
             self.low, self.high = self.off + 2.0 * (self.low - self.off), self.off + 2.0 * (self.high - self.off)
         self.start = self.off.copy()
         if effect == "dynamic_eccentricity":  # d cos psi, d sin psi
             self.low, self.high, self.off = np.full(2, -0.06), np.full(2, 0.06), np.zeros(2)
             self.start = self.off.copy()
-        elif effect == "stribeck":
-            self.low, self.start = np.array([0.0, 1.0]), np.array([0.005, 6.0])
-        elif effect == "compliance":
-            self.low, self.start = np.array([2e3, 200.0]), np.array([1e4, 300.0])
+        elif effect in BEGUN:
+            low, start = BEGUN[effect]
+            size = [p.high / EFFECTS[effect].parameters[n].high for n, p in zip(self.names, chosen)]
+            self.low, self.start = np.multiply(size, low), np.multiply(size, start)
 
     def values(self, at: np.ndarray) -> dict[str, float]:
         """Parameters of the effect at these coordinates."""
@@ -388,6 +395,3 @@ class Coordinates:
             return np.array([1.0]) if at[0] < 0.5 else np.array([-1.0])
         reach = self.high - self.low
         return np.where(at + 0.2 * reach <= self.high, 0.2, -0.2) * reach
-
-
-COORDINATES = {effect: Coordinates(effect) for effect in EFFECTS}
