@@ -10,10 +10,15 @@ import emafault
 from datasheet.test_sheet import EXAMPLES
 from emafault import config
 from emafault.actuator.parameters import ActuatorParameters
+from emafault.actuator.sensors import SensorNoise
+from emafault.datasheet.compose import of_file
 from emafault.equations.probabilities import basis, checked_on
 from emafault.errors import InputError
 from emafault.study import calibration
+from emafault.study.blind import run_cases
 from emafault.study.calibration import begin, finish, summary
+from emafault.withheld.population import population_of
+from emafault.withheld.scoring import score
 from emafault.withheld.verdicts import judge
 from withheld.test_scoring import key_of, verdict_of
 
@@ -107,6 +112,28 @@ def test_the_check_of_another_actuator_is_refused(written):
         checked_on(other, path)
     identified = ActuatorParameters(**asdict(actuator) | {"resistance": 1.04 * actuator.resistance})
     assert checked_on(identified, path)["same"]
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory):
+    """Judged cases of the three example actuators, of 28, 48 and 270 V, by name of the file."""
+    out = {}
+    for path in sorted(EXAMPLES.glob("*.yaml")):
+        machine, folder = of_file(path), tmp_path_factory.mktemp(path.stem)
+        population = population_of(machine.actuator, machine.tolerances())
+        noise = SensorNoise(**config.compose()["sensors"])
+        for rung, seeds in (("T0", (40001, 40003)), ("T1", (40011,))):
+            run_cases(rung, seeds, folder, machine.actuator, noise, population=population)
+        out[path.stem] = score(folder)["rows"]
+    return out
+
+
+def test_what_was_checked_on_the_reference_actuator_holds_on_three(three):
+    assert [name.rpartition("_")[2] for name in three] == ["28v", "48v", "270v"]
+    for name, rows in three.items():
+        assert [r["right"] for r in rows] == [True] * 3, name
+    found = summary([row for rows in three.values() for row in rows])
+    assert found["holds"] and found["false_names"] == {"named": 0, "cases": 6}
 
 
 def test_how_long_it_takes_is_said_before_the_cases(tmp_path, monkeypatch, capsys):
