@@ -393,7 +393,9 @@ def known(config: Mapping[str, Any]) -> dict[str, float]:
 
 def network_spec(config: Mapping[str, Any], estimator: str) -> dict[str, Any]:
     """What fitting an estimator reads; that of the search reads its network and training from what the search found."""
-    spec = identification_spec(config)
+    spec, dataset = identification_spec(config), dataset_spec(config, "training")
+    if dataset["tolerance"]:  # whose units differ
+        spec["units"] = dataset
     if estimator != "closed_form":
         spec["seeds"] = config["evaluation"]["seeds"]
     if estimator == "network":

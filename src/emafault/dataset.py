@@ -25,6 +25,12 @@ from .progress import progress, say
 
 BLOCK = 25  # runs simulated, written and read at a time
 FASTEST = 5.0  # times the speed at which the back-EMF of a phase is the bus voltage
+#: parameter of the actuator, the effect that has its tolerance and the factor's name there
+_UNIT = (
+    ("resistance", "unit_calibration", "R_scale"),
+    ("back_emf", "unit_calibration", "k_scale"),
+    ("inductance", "inductance_tolerance", "L_scale"),
+)
 CHUNK_CACHE = 2**20  # bytes a variable; chunks are written and read whole, the library's 16 MB would only fill up
 
 
@@ -104,6 +110,22 @@ def sample_runs(spec: Mapping[str, Any], faults: np.ndarray | None = None) -> Sa
                     deviation = spec["tolerance"] * own
                     spread[effect.field(name)] = 1.0 + deviation * rng.standard_normal(number // repeats)
     return Sample(spec, faults, faults[:, 5] - colder, theta_0, spread)
+
+
+def unit_parameters(spec: Mapping[str, Any]) -> np.ndarray:
+    """(run, 9) R0 (ohm), k0 (V s/rad) and L0 (H) of phases a, b, c of each run's unit, as its tolerances make them.
+
+    Parameters
+    ----------
+    spec : the sub-tree ``config.dataset_spec``
+    """
+    sample, actuator = sample_runs(spec), spec["actuator"]
+    unit = np.arange(len(sample.faults)) // spec["recordings_of_a_unit"]
+    out = np.empty((len(unit), 9))
+    for n, (key, effect, scale) in enumerate(_UNIT):
+        factor = sample.spread.get(EFFECTS[effect].field(scale))
+        out[:, 3 * n : 3 * n + 3] = actuator[key] * (np.ones(len(unit)) if factor is None else factor[unit])[:, None]
+    return out
 
 
 def simulate_blocks(

@@ -55,6 +55,8 @@ IDENTIFIERS: dict[str, tuple[Callable[[Any], object], str]] = {
     "another width": (_set("network", "settings", "width", to=200), "network"),
     "alpha a word": (_set("alpha_m", to="x"), "alpha_m"),
     "alpha null": (_set("alpha_m", to=None), "alpha_m"),
+    "noise short": (_set("noise", to=[[1e-6]]), "noise"),
+    "noise negative": (_set("noise", to=[[-1e-6 * (m == n) for m in range(6)] for n in range(6)]), "noise"),
     "lag of 1e300": (_set("lag", to=1e300), "lag"),
     "lag true": (_set("lag", to=True), "lag"),
     "scores negative": (_set("intervals", "scores", 0, 0, to=-1.0), "intervals.scores"),

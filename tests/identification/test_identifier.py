@@ -11,7 +11,8 @@ from emafault.identification import evaluation
 from emafault.identification.export import export_onnx
 from emafault.identification.identifier import Identifier, fit_identifier
 from emafault.identification.intervals import ConformalIntervals, coverage
-from emafault.identification.posterior import nominal_nine
+from emafault.identification.posterior import Knowledge, nominal_nine
+from emafault.reconstruction.features import Features
 
 from .conftest import NOISE
 
@@ -141,6 +142,52 @@ def test_intervals_know_that_a_reference_record_is_noisy_too(fitted, fresh, actu
         untold = evaluation.evaluate(fit.identifier, fresh, width, 0.9, unit)
         assert abs(told["coverage"]["mean"] - 0.9) < 0.03
         assert untold["coverage"]["mean"] < 0.8
+
+
+def test_intervals_hold_for_units_that_differ_with_and_without_a_healthy_record(make_set, actuator):
+    known = Knowledge(R=0.01, k=0.005)
+    nominal = nominal_nine(actuator)
+
+    def spread(data, seed):
+        own = 1.0 + np.random.default_rng(seed).normal(size=(len(data.faults), 2)) * [known.R, known.k]
+        scale = np.repeat(own, 3, axis=1)
+        covariance = data.covariance * scale[:, :, None] * scale[:, None, :]
+        return evaluation.FeatureSet(data.features * scale, data.faults, covariance), scale
+
+    (taught, scale), (new, own) = spread(make_set(600, 1), 31), spread(make_set(1000, 2), 32)
+    units = nominal * np.column_stack([scale, np.ones((600, 3))])
+    noise = np.kron(NOISE, np.eye(3)) * np.outer(nominal[:6], nominal[:6])
+    measured = nominal[:6] * own + np.random.default_rng(33).multivariate_normal(np.zeros(6), noise, 1000)
+    for name in ("network", "closed_form"):
+        fit = fit_identifier(
+            name, taught.features, taught.faults, actuator, covariance=taught.covariance, units=units, known=known,
+            **SETTINGS,
+        )  # fmt: skip
+        widths = []
+        for unit in ((None, None), (measured, noise)):
+            low, high = fit.identifier.interval(new.features, 0.9, new.covariance, *unit)
+            share = coverage(low, high, new.faults)
+            assert abs(share["mean"] - 0.9) < 0.03 and all(abs(share[c] - 0.9) < 0.06 for c in FAULT_NAMES), name
+            widths.append(np.mean(high - low, axis=0)[5])
+        assert widths[1] < 0.5 * widths[0]
+
+
+def test_a_reconstruction_without_covariance_tells_the_noise_of_a_healthy_record_by_the_rows_learnt_from(
+    fresh, training, actuator
+):
+    healthy = nominal_nine(actuator)[:6]
+    fit = fit_identifier("network", training.features, training.faults, actuator, **SETTINGS)
+    np.testing.assert_allclose(np.diagonal(fit.identifier.noise), np.repeat(np.diagonal(NOISE), 3), rtol=0.25)
+    unknown = np.full((1, 6, 6), np.nan)
+    phases = np.full((1, 3), np.nan)
+    told = fit.identifier.with_noise(Features(healthy[None, :3], healthy[None, 3:], phases, phases, unknown))
+    rng = np.random.default_rng(8)
+    covariance = np.kron(NOISE, np.eye(3)) * np.outer(healthy, healthy)
+    unit = rng.multivariate_normal(healthy, covariance, len(fresh.faults))
+    low, high = fit.identifier.interval(fresh.features, 0.9, None, unit, told.covariance[0])
+    assert abs(coverage(low, high, fresh.faults)["mean"] - 0.9) < 0.03
+    known = Features(healthy[None, :3], healthy[None, 3:], phases, phases, covariance[None])
+    assert fit.identifier.with_noise(known) is known
 
 
 def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):

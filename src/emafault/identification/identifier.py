@@ -15,6 +15,7 @@ from ..errors import InputError, one_line, shown
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
 from ..plain import array, read_json
+from ..reconstruction.features import Features
 from .intervals import ConformalIntervals
 from .network import Network, logarithmic
 from .posterior import Knowledge, Posterior, model_error, nominal_nine, posterior
@@ -22,11 +23,12 @@ from .settings import NetworkSettings, TrainingSettings
 from .training import TrainedNetwork, train
 
 ESTIMATORS = ("network", "closed_form")
+LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
 FILE = "identifier.json"
 _FORMAT = 1
 _KEYS = (
     "format", "estimator", "actuator", "alpha_m", "lag", "intervals", "network", "feature_low", "feature_high",
-    "healthy", "known",
+    "healthy", "known", "noise",
 )  # fmt: skip
 
 
@@ -37,8 +39,9 @@ class Identifier:
     Features are (run, 6) [R_a, R_b, R_c, k_a, k_b, k_c], (run, 8) with xi_x and xi_y behind them where the
     reconstruction measures xi by itself, or (run, 9) with L_a, L_b, L_c behind them. A ``unit`` is the (6,) or (run, 6)
     array of R and k of the healthy unit at 20 degC, of nine features (9,) or (run, 9) with L: features and covariance
-    are scaled to the nominal actuator before use. The closed form of nine features weighs them by their covariance
-    together with the unit's, or with what is ``known`` of a unit that was not measured.
+    are scaled to the nominal actuator before use. What is not known of the unit is added to their covariance, by its
+    healthy recordings or, of a unit that was not measured, as ``known``: intervals count it, and the closed form of
+    nine features weighs by it.
     """
 
     actuator: ActuatorParameters
@@ -49,7 +52,8 @@ class Identifier:
     feature_low: np.ndarray | None = None  # (feature,) range of the rows learnt from
     feature_high: np.ndarray | None = None
     healthy: np.ndarray | None = None  # R, k (and L) that it takes for healthy at 20 degC; None: the nominal ones
-    known: Knowledge = field(default_factory=Knowledge)  # read by the closed form of nine features
+    known: Knowledge = field(default_factory=Knowledge)  # of any unit and its magnets, beforehand
+    noise: np.ndarray | None = None  # (6, 6) relative covariance of R and k, of a reconstruction that tells none
 
     @property
     def estimator(self) -> str:
@@ -63,12 +67,13 @@ class Identifier:
 
     @property
     def prior(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Mean and covariance of R0, k0, L0 of any unit, for ``calibrate``; None where the tolerance is not used."""
-        covariance, nominal = self.known.covariance(), nominal_nine(self.actuator)
-        nine = self.feature_low is None or len(self.feature_low) == 9
-        if self.network is not None or not nine or not np.any(covariance):
+        """Mean and covariance of R0, k0, L0 of any unit, for ``calibrate``; None where nothing is left open."""
+        covariance, mean = self.known.covariance(), nominal_nine(self.actuator)
+        if not np.any(covariance):
             return None
-        return nominal, covariance * np.outer(nominal, nominal)
+        if self.healthy is not None:
+            mean[: len(self.healthy)] = self.healthy
+        return mean, covariance * np.outer(mean, mean)
 
     def predict(
         self,
@@ -97,11 +102,15 @@ class Identifier:
         """Low and high end (run, 6) of the prediction interval at ``level``.
 
         ``covariance`` (run, 6, 6) of the features, or (run, 9, 9) of nine, scales the width of each run; without it
-        that of the calibration rows is taken. ``unit_covariance``, (6, 6) or (run, 6, 6) of ``unit``, widens them.
+        that of the calibration rows is taken. ``unit_covariance``, (6, 6) or (run, 6, 6) of ``unit``, widens them, and
+        so does, without ``unit``, what is not known of any unit.
         """
+        untold = covariance is None
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        value = _estimate(self, features, covariance)
-        half = self.intervals.half_width(level, _variance(self, features, covariance), len(features))
+        value, variance = _estimate(self, features, covariance), _variance(self, features, covariance)
+        if untold and variance is not None:  # that of the unit alone
+            variance = variance + self.intervals.typical_variance
+        half = self.intervals.half_width(level, variance, len(features))
         return value - half, value + half
 
     def estimate(
@@ -139,6 +148,12 @@ class Identifier:
         x, C = replace(self, network=None)._nominal(features, covariance, unit, unit_covariance)
         return np.zeros(len(x)) if C is None else model_error(x, C, self.actuator, self.alpha_m, self.known)
 
+    def with_noise(self, features: Features) -> Features:
+        """Features with the covariance of those learnt from, where their reconstruction tells none."""
+        if self.noise is None or np.any(np.isfinite(features.covariance)):
+            return features
+        return replace(features, covariance=self.noise * features.six[:, :, None] * features.six[:, None, :])
+
     def outside(self, features: np.ndarray, unit: np.ndarray | None = None) -> np.ndarray:
         """How far each run (run,) lies outside the features learnt from, as a fraction of their range; 0 is inside."""
         if self.feature_low is None or self.feature_high is None:
@@ -168,8 +183,12 @@ class Identifier:
                 share = features[:, :scaled] / unit  # an error of the unit's R or k is one of the scaled feature
                 added = np.asarray(unit_covariance, float) * share[:, :, None] * share[:, None, :]
                 covariance = added if covariance is None else covariance + added
-        elif width == 9 and self.network is None and covariance is not None:
-            covariance = covariance + self.known.covariance() * features[:, :, None] * features[:, None, :]
+        elif np.any(known := self.known.covariance()[:scaled, :scaled]):
+            added = known * features[:, :scaled, None] * features[:, None, :scaled]
+            if covariance is not None:
+                covariance = covariance + added
+            elif self.network is not None or width != 9:  # which weighs by the noise, too
+                covariance = added
         return features, covariance
 
     def save(self, folder: str | Path) -> None:
@@ -191,6 +210,7 @@ class Identifier:
             "feature_high": None if self.feature_high is None else self.feature_high.tolist(),
             "healthy": None if self.healthy is None else self.healthy.tolist(),
             "known": asdict(self.known),
+            "noise": None if self.noise is None else self.noise.tolist(),
         }
         replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
 
@@ -239,6 +259,9 @@ def _from_plain(plain: Any) -> Identifier:
     healthy = None if plain.get("healthy") is None else array(plain["healthy"], "healthy")
     if healthy is not None and not (healthy.shape in ((6,), (9,)) and np.all(healthy > 0.0)):
         raise InputError(f"healthy: got {shown(plain['healthy'])}, accepted are R and k, or R, k and L, above 0")
+    noise = None if plain.get("noise") is None else array(plain["noise"], "noise", (6, 6))
+    if noise is not None and not (np.allclose(noise, noise.T, atol=0.0) and np.linalg.eigvalsh(noise)[0] > 0.0):
+        raise InputError("noise: accepted is a symmetric, positive definite covariance of R and k")
     known = plain.get("known", {})
     schema.check(known, dict[str, Any], "known")
     for key in known:
@@ -255,7 +278,24 @@ def _from_plain(plain: Any) -> Identifier:
         high,
         healthy,
         Knowledge(**known),
+        noise,
     )
+
+
+def over_laws(
+    features: np.ndarray, faults: np.ndarray, actuator: ActuatorParameters, alpha_m: float, lag: float
+) -> np.ndarray:
+    """(run, 6) R and k over those of the fault laws, of nine features (run, 9) with L.
+
+    Of the laws with and without xi in k the one that fits better counts.
+    """
+    used = logarithmic(features.shape[1])
+    ratios = []
+    for law in ("stator_fixed", "rotor_angle"):
+        R, k = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
+        true = np.concatenate([R, k, closed_form.inductance(faults, actuator)], axis=1)
+        ratios.append(features[:, :used] / true[:, :used])
+    return min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
 
 
 def learnt_healthy(
@@ -265,19 +305,12 @@ def learnt_healthy(
 
     A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
     as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
-    differs from 1 by more than chance; of the laws with and without xi in k the one that fits better.
+    differs from 1 by more than chance.
     """
-    used = logarithmic(features.shape[1])
-    nominal = nominal_nine(actuator)[:used]
-    ratios = []
-    for law in ("stator_fixed", "rotor_angle"):
-        R, k = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
-        true = np.concatenate([R, k, closed_form.inductance(faults, actuator)], axis=1)
-        ratios.append(features[:, :used] / true[:, :used])
-    ratio = min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
+    ratio = over_laws(features, faults, actuator, alpha_m, lag)
     bias = np.mean(ratio, axis=0)
     chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
-    return nominal * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
+    return nominal_nine(actuator)[: ratio.shape[1]] * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
 
 
 def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
@@ -339,6 +372,7 @@ def fit_identifier(
     lag: float = 0.0,
     known: Knowledge | None = None,
     covariance: np.ndarray | None = None,
+    units: np.ndarray | None = None,
     network: Mapping[str, Any] | NetworkSettings | None = None,
     training: Mapping[str, Any] | TrainingSettings | None = None,
     intervals: str = "cross",
@@ -347,7 +381,8 @@ def fit_identifier(
 ) -> Fit:
     """Train an estimator and calibrate its intervals on rows that it, or the network of their fold, was not trained on.
 
-    Rows whose record gave no features (NaN) are left out.
+    Rows whose record gave no features (NaN) are left out. Intervals are calibrated on rows scaled to the nominal unit:
+    what a unit is off by is not the estimator's error, and whoever identifies tells how well it is known.
 
     Parameters
     ----------
@@ -356,10 +391,11 @@ def fit_identifier(
     alpha_m, lag : the magnets' temperature coefficient (1/K) and how much colder than the winding they are expected
         (K); the
         closed form needs them, a network learns them
-    known : what is known beforehand, of which the closed form of nine features makes its posterior; its lag counts
-        there. Its intervals are the posterior's
+    known : what is known beforehand of a unit without healthy recordings; of it the closed form of nine features
+        makes its posterior, whose intervals it has, and its lag counts there
     covariance : (run, 6, 6) of R and k, to normalise the intervals, or (run, 9, 9) of nine features; None where the
         reconstruction gives none
+    units : (run, 9) R0 (ohm), k0 (V s/rad) and L0 (H) of each run's unit; None where all are nominal
     intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the
         70/15/15 calibrates)
 
@@ -376,6 +412,7 @@ def fit_identifier(
     if not np.all(identified):
         features, faults = features[identified], faults[identified]
         covariance = None if covariance is None else covariance[identified]
+        units = None if units is None else units[identified]
     if len(features) < 10:
         raise InputError(f"identification: {len(features)} runs have features, at least 10 are needed to learn from")
     if covariance is not None and not np.all(np.isfinite(covariance)):
@@ -383,15 +420,25 @@ def fit_identifier(
     placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
     identifier = Identifier(actuator, alpha_m, lag, placeholder, None, features.min(axis=0), features.max(axis=0))
     identifier = replace(identifier, known=known or Knowledge(lag=lag))
+    nominal, spread = features.copy(), covariance
+    scaled = logarithmic(features.shape[1])
+    if units is not None:
+        scale = nominal_nine(actuator)[:scaled] / units[:, :scaled]
+        nominal[:, :scaled] *= scale
+        spread = None if covariance is None else covariance * scale[:, :, None] * scale[:, None, :]
+    if covariance is None and scaled == 6:
+        ratio = over_laws(nominal, faults, actuator, alpha_m, lag)
+        noise = np.cov(ratio / np.mean(ratio, axis=0), rowvar=False) + LEAST_NOISE * np.eye(6)
+        identifier = replace(identifier, noise=noise)
     trained = None
     if estimator == "network":
         trained = train(features, faults, network, training, seed)
-        healthy = learnt_healthy(features, faults, actuator, alpha_m, lag)
+        healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
         identifier = replace(identifier, network=trained.network, healthy=healthy)
 
     def residuals_of(model: Identifier, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        part = None if covariance is None else covariance[rows]
-        return _estimate(model, features[rows], part) - faults[rows], _variance(model, features[rows], part)
+        part = None if spread is None else spread[rows]
+        return _estimate(model, nominal[rows], part) - faults[rows], _variance(model, nominal[rows], part)
 
     if trained is None and features.shape[1] == 9:
         return Fit(replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features")))

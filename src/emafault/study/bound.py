@@ -26,9 +26,9 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
     """Cramer-Rao standard deviations of the first fresh runs' faults.
 
     ``plateau`` and ``floating`` are those of six features, from plateau samples and with floating ones too;
-    ``recording`` is that of all intervals of the recording with L among the coefficients, and with what is known of R0,
-    k0, L0 and the magnets' lag beforehand, ``heating`` the same where the rate at which the winding warms is unknown,
-    too (left out where no method asks for it). With ``_calibrated`` behind they are those of units that have healthy
+    ``recording`` is that of all intervals of the recording with L among the coefficients, ``heating`` the same where
+    the rate at which the winding warms is unknown, too (left out where no method asks for it). All count what is known
+    of R0, k0, L0 and the magnets' lag beforehand. With ``_calibrated`` behind they are those of units that have healthy
     recordings. They are NaN where the bounds do not hold: without noise, and under the rotor-angle laws, whose R, k
     carry no xi.
 
@@ -74,8 +74,7 @@ def compute_bound(spec: Mapping[str, Any], output: str | Path) -> None:
         of_run = faults[rows], actuator, alpha_m, known, sample.dT_magnet[rows]
         for name in names:
             covariance = coefficient_bound(name, clean, interval, actuator, noise, spec["discard"])
-            unknown = np.zeros((6, 6)) if name in SIX else known.covariance()
-            found[name].append(least_of(covariance, unknown, *of_run))
+            found[name].append(least_of(covariance, known.covariance(), *of_run))
             if healthy:
                 found[name + CALIBRATED].append(least_of(covariance, units[name], *of_run))
     data = xr.Dataset(

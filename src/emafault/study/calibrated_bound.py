@@ -59,14 +59,17 @@ def least_of(
     Parameters
     ----------
     covariance : (run, width, width) smallest of six or nine coefficients (SI)
-    unit : (width, width) or (run, width, width) relative covariance to which the unit is known
-    known : of which the lag is read, by nine coefficients
+    unit : (9, 9), (width, width) or (run, width, width) relative covariance to which the unit is known
+    known : of which the lag is read
     """
     width = covariance.shape[2]
     true = nine_forward(faults, actuator, alpha_m, dT_magnet)[:, :width]
-    whole = covariance + unit * true[:, :, None] * true[:, None, :]
+    whole = covariance + unit[..., :width, :width] * true[:, :, None] * true[:, None, :]
     if width == 6:
-        derivative = jacobian(lambda x: inverse(x[..., :3], x[..., 3:], actuator, alpha_m), true)
+        # six features do not tell the lag, an error of which is one of the flux that the phases have in common
+        flux = true[:, 3:] * (alpha_m * known.lag_deviation / (1.0 + alpha_m * dT_magnet))[:, None]
+        whole[:, 3:, 3:] += flux[:, :, None] * flux[:, None, :]
+        derivative = jacobian(lambda x: inverse(x[..., :3], x[..., 3:], actuator, alpha_m, known.lag), true)
         least = propagate(whole, derivative)
     else:
         least = posterior(true, whole, actuator, alpha_m, known).covariance
@@ -107,7 +110,7 @@ class HealthyUnits:
         actuator, width, alpha_m = self.actuator, covariance.shape[2], self.spec["magnet_coefficient"]
         nominal, known = nominal_nine(actuator), Knowledge(**self.spec["known"]).covariance()
         options = {"ambient_error": self.spec["ambient_error"], "alpha_m": alpha_m, "healthy_within": 0.0}
-        if width == 9 and np.any(known):
+        if np.any(known):
             options["prior"] = nominal, known * np.outer(nominal, nominal)
         found = []
         for n in range(0, len(faults), self.each):

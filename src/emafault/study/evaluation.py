@@ -23,14 +23,16 @@ _GAUSSIAN = np.sqrt(2.0 / np.pi)  # mean absolute value over standard deviation
 
 
 def healthy_units(
-    reference: FeatureTable, units: int, spec: Mapping[str, Any], prior: tuple[np.ndarray, np.ndarray] | None = None
+    reference: FeatureTable, units: int, spec: Mapping[str, Any], identifier: Identifier
 ) -> tuple[np.ndarray, np.ndarray]:
     """(unit, 6) R (ohm) and k (V s/rad) of each unit at 20 degC from its healthy recordings, and their covariance.
 
-    Of nine features (unit, 9), with L (H). ``prior`` is what is known of any unit, as of ``calibrate``.
+    Of nine features (unit, 9), with L (H). The identifier tells what is known of any unit, and the noise of features
+    whose reconstruction does not tell it.
     """
     actuator = ActuatorParameters(**spec["actuator"])
-    options = {"ambient_error": spec["ambient_error"], "alpha_m": spec["magnet_coefficient"], "prior": prior}
+    options = {"ambient_error": spec["ambient_error"], "alpha_m": spec["magnet_coefficient"], "prior": identifier.prior}
+    reference = replace(reference, features=identifier.with_noise(reference.features))
     width = reference.features.inputs_covariance.shape[1]
     found_unit, covariance = np.full((units, width), np.nan), np.full((units, width, width), np.nan)
     for unit, rows in enumerate(np.arange(len(reference.faults)).reshape(units, -1)):
@@ -86,7 +88,7 @@ def evaluate_identification(
         }
         calibrations: dict[str, tuple] = {"": (None, None)}
         if method in units:
-            calibrations[CALIBRATED] = healthy_units(units[method], len(table.faults), spec, models[0].prior)
+            calibrations[CALIBRATED] = healthy_units(units[method], len(table.faults), spec, models[0])
         for name, (unit, covariance) in calibrations.items():
             known = np.all(np.isfinite(data.features), axis=1)
             if unit is not None:

@@ -41,9 +41,14 @@ class FeatureTable:
         known = self.features.identified
         return covariance if np.any(known) and np.all(np.isfinite(covariance[known])) else None
 
+    @property
+    def known(self) -> np.ndarray:
+        """(run,) whether the record held enough to estimate all features."""
+        return np.all(np.isfinite(self.inputs), axis=1)
+
     def identified(self) -> "FeatureTable":
         """The runs whose records held enough to estimate all features."""
-        known = np.all(np.isfinite(self.inputs), axis=1)
+        known = self.known
         return self if np.all(known) else self.rows(known)
 
     def rows(self, rows: np.ndarray) -> "FeatureTable":

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
+from ..dataset import unit_parameters
 from ..errors import InputError
 from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
@@ -47,7 +48,7 @@ def seed_folder(folder: str | Path, seed: int) -> Path:
     return Path(folder) / f"seed_{seed}"
 
 
-def _fit(estimator: str, table: FeatureTable, spec: Mapping[str, Any], seed: int) -> Fit:
+def _fit(estimator: str, table: FeatureTable, units: np.ndarray | None, spec: Mapping[str, Any], seed: int) -> Fit:
     return fit_identifier(
         estimator,
         table.inputs,
@@ -57,6 +58,7 @@ def _fit(estimator: str, table: FeatureTable, spec: Mapping[str, Any], seed: int
         lag=spec["known"]["lag"],
         known=Knowledge(**spec["known"]),
         covariance=table.covariance,
+        units=units,
         network=spec.get("network"),
         training=spec.get("training"),
         seed=seed,
@@ -77,15 +79,17 @@ def train_identifier(
     ------
     InputError : features that cannot be used, or a folder that cannot be written
     """
-    table = read_features(features).identified()
-    settings = dict(spec)
+    whole = read_features(features)
+    table, settings = whole.identified(), dict(spec)
+    # of units that are all alike there is nothing to take out
+    units = unit_parameters(spec["units"])[whole.known] if "units" in spec else None
     if chosen:
         settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
     folder, curves = Path(history).parent, []
     seeds = range(1 if estimator == "closed_form" else settings["seeds"])
     for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
         kind = "closed_form" if estimator == "closed_form" else "network"
-        fit = _fit(kind, table, settings, seed)
+        fit = _fit(kind, table, units, settings, seed)
         fit.identifier.save(seed_folder(folder, seed))
         if fit.trained:
             curves.append([asdict(curve) for curve in fit.trained.curves])

@@ -223,10 +223,9 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
         "Mean absolute errors on fresh rows; ± is the standard deviation over seeds. Rows named weighted use plateau "
         "samples and stand beside that bound, those named nine beside the recordings' own, nine heating beside that of "
         "a winding that warms at an unknown rate, all others beside the bound with floating-phase samples. The bounds "
-        "of six features come from the voltage-current-speed equations with R, "
-        "k, L and offset of each phase free; the magnets' lag behind the winding and the healthy unit's R and k count "
-        "as known to them. That of the recordings comes from all intervals, with L a coefficient of the fault and what "
-        "is known beforehand of R, k, L and the lag as the configuration says (unit.known, magnet.lag)."
+        "of six features come from the voltage-current-speed equations with R, k, L and offset of each phase free, "
+        "that of the recordings from all intervals, with L a coefficient of the fault. Both count what is known "
+        "beforehand of R, k, L and the lag as the configuration says (unit.known, magnet.lag)."
     )
     page.paragraph(text, "small")
     if any(entry.get("unidentified") for entry in table["results"]):
