@@ -1,7 +1,7 @@
 """Identification of one's own recordings by a reconstruction and an estimator fitted to its features."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import PHASES, Recording
 from ..io.sensors import refuse_mistaken
-from ..reconstruction import Features
+from ..reconstruction import Features, join_features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
 from .posterior import CHANCE
@@ -77,8 +77,9 @@ def identify_recordings(
                 f"{recording.name}: does not determine R and k of all three phases; a longer motion is needed"
             )
     unit = covariance = None
+    of_unit: list[str] = []
     if reference:
-        healthy = reconstruct_recordings(reference, model.method, identifier.actuator, model.settings)
+        healthy, of_unit = _healthy(model, reference)
         ambient = np.array([recording.ambient_temperature for recording in reference])
         options = {"ambient_error": model.ambient_error, "alpha_m": identifier.alpha_m}
         found = calibrate(healthy, ambient, identifier.actuator, prior=identifier.prior, **options)
@@ -88,9 +89,12 @@ def identify_recordings(
     told: list[np.ndarray | None] = []
     for recording, own in zip(recordings, features, strict=True):
         inputs, noise = own.inputs, own.inputs_covariance if np.all(np.isfinite(own.inputs_covariance)) else None
-        noise, said = _with_misfit(recording.name, own, noise, identifier, unit, covariance)
+        unexplained, said = _unexplained(recording, own, identifier)
+        noise, more = _with_misfit(recording.name, own, noise, unexplained, identifier, unit, covariance)
+        said += more + of_unit
         if not as_one:
-            estimates += identifier.estimate(inputs, level, noise, unit, covariance)
+            (estimate,) = identifier.estimate(inputs, level, noise, unit, covariance)
+            estimates.append(estimate if noise is not None else _widened(estimate, unexplained))
         told.append(noise)
         beyond = float(identifier.outside(inputs, unit)[0])
         if beyond > 0.05:
@@ -155,47 +159,86 @@ def _as_one(
     ]
 
 
+def _healthy(model: Model, reference: Sequence[Recording]) -> tuple[Features, list[str]]:
+    """Features of a unit's healthy recordings, with what their equations leave unexplained, and that in words."""
+    identifier, parts, said = model.identifier, [], []
+    for recording in reference:
+        own = reconstruct_recordings([recording], model.method, identifier.actuator, model.settings)
+        unexplained, words = _unexplained(recording, own, identifier)
+        own = identifier.with_noise(own)
+        extras = dict(own.extras)
+        if "nine_covariance" in extras:
+            extras["nine_covariance"] = extras["nine_covariance"] * (1.0 + unexplained)
+        parts.append(replace(own, covariance=own.covariance * (1.0 + unexplained), extras=extras))
+        said += [f"{recording.name}: {word}" for word in words]
+    return join_features(parts), said
+
+
+def _unexplained(recording: Recording, own: Features, identifier: Identifier) -> tuple[float, list[str]]:
+    """Chi-squared of the phases whose voltage does not fit its equation, beyond what noise makes; and that in words.
+
+    A method that fits no equation of its own, as the paper's, is told by the equations that ``weighted`` fits.
+    """
+    said: list[str] = []
+    if "fit" not in own.extras:
+        try:
+            own = reconstruct_recordings([recording], "weighted", identifier.actuator, {"floating": True})
+        except InputError:
+            return 0.0, ["whether its voltages fit their equations is not told: too little of the recording is of use"]
+    fit, freedom = own.extras["fit"][0], own.extras["freedom"][0]
+    if "nine_covariance" in own.extras and np.any(np.isnan(fit)):
+        said.append(
+            "no end currents are recorded, the inductance is not told: intervals are about those of six features"
+        )
+    poor = np.flatnonzero(fit * freedom > chi2.isf(CHANCE, np.maximum(freedom, 1)))
+    if not len(poor):
+        return 0.0, said
+    phases = ", ".join(PHASES[j] for j in poor)
+    said.append(
+        f"the voltage of phase {phases} does not fit its equation (chi-squared {np.max(fit[poor]):.2g} per degree "
+        "of freedom): intervals are widened by what that can do at most"
+    )
+    return float(np.sum((fit[poor] - 1.0) * freedom[poor])), said
+
+
+def _widened(estimate: dict[str, dict[str, float]], unexplained: float) -> dict[str, dict[str, float]]:
+    """An estimate of features whose noise is not told, as wide as ``_with_misfit`` makes the others."""
+    by = float(np.sqrt(1.0 + unexplained))
+    return {
+        name: {key: e["value"] + by * (e[key] - e["value"]) for key in ("value", "low", "high")}
+        for name, e in estimate.items()
+    }
+
+
 def _with_misfit(
     name: str,
     own: Features,
     noise: np.ndarray | None,
+    unexplained: float,
     identifier: Identifier,
     unit: np.ndarray | None,
     unit_covariance: np.ndarray | None,
 ) -> tuple[np.ndarray | None, list[str]]:
-    """Covariance of a recording's nine features with what its equations and laws leave unexplained, and that in words.
+    """Covariance of a recording's features with what its equations and laws leave unexplained, and the laws' in words.
 
     Raises
     ------
     InputError : coefficients that no fault of this actuator has
     """
-    said: list[str] = []
-    if noise is None or "fit" not in own.extras:
-        return noise, said
-    fit, freedom = own.extras["fit"][0], own.extras["freedom"][0]
-    if np.any(np.isnan(fit)):
-        said.append(
-            "no end currents are recorded, the inductance is not told: intervals are about those of six features"
-        )
-    poor = np.flatnonzero(fit * freedom > chi2.isf(CHANCE, np.maximum(freedom, 1)))
-    if len(poor):
-        # Cauchy and Schwarz: a misfit of chi-squared x beyond noise moves no estimate by more than x^0.5 of its errors
-        noise = noise * (1.0 + float(np.sum((fit[poor] - 1.0) * freedom[poor])))
-        phases = ", ".join(PHASES[j] for j in poor)
-        said.append(
-            f"the voltage of phase {phases} does not fit its equation (chi-squared {np.max(fit[poor]):.2g} per degree "
-            "of freedom): intervals are widened by what that can do at most"
-        )
+    if noise is None:
+        return noise, []
+    # Cauchy and Schwarz: a misfit of chi-squared x beyond noise moves no estimate by more than x^0.5 of its errors
+    noise = noise * (1.0 + unexplained)
     off = float(identifier.model_error(own.inputs, noise, unit, unit_covariance)[0])
     if off > LARGEST_MODEL_ERROR:
         raise InputError(
             f"{name}: R, k and L of the phases fit no fault of this actuator by {off:.0%}; the recording is of another "
             "unit or its sensors are off, --reference calibrates on healthy recordings"
         )
-    if off:
-        noise = noise + np.eye(9) * (off * own.inputs) ** 2
-        said.append(f"R, k and L fit no fault of this unit by {off:.2g} of their values: intervals are widened")
-    return noise, said
+    if not off:
+        return noise, []
+    noise = noise + np.eye(9) * (off * own.inputs) ** 2
+    return noise, [f"R, k and L fit no fault of this unit by {off:.2g} of their values: intervals are widened"]
 
 
 def _beside_ambient(

@@ -114,7 +114,7 @@ def reconstruct_angle_resolved(signals: Signals, actuator: ActuatorParameters, s
 
     ``extras``: ``xi`` (run, 2) and ``xi_covariance`` (run, 2, 2); ``harmonics`` (run, phase, 2 order), which are c_1,
     s_1, c_2, ... relative to k_j; ``R_theta``, ``k_theta``, ``R_theta_error``, ``k_theta_error`` (run, phase, n);
-    ``chi2`` and ``samples`` (run, phase).
+    ``chi2``, ``samples``, ``fit`` and ``freedom`` (run, phase), as of ``weighted``.
     """
     s = read_settings(AngleResolvedSettings, settings, "angle_resolved")
     check_settings(s, "angle_resolved")

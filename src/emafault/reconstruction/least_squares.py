@@ -24,6 +24,7 @@ class PhaseFit:
     beta: np.ndarray  # (unknown,) R, k, L, intercept, ...
     covariance: np.ndarray  # (unknown, unknown)
     chi2: float  # residual variance over the one expected
+    white: np.ndarray  # (row,) residuals, independent of each other, of unit variance where the equation holds
     speed_influence: np.ndarray  # (row, unknown) change of beta per unit of standardised speed noise of each row
 
 
@@ -113,7 +114,7 @@ class PhaseProblem:
         self.prior[DIDT] = 0.0 if self.end_measured else prior_L**-2
 
     def _weigh(self, beta: np.ndarray, noise: NoiseLevels):
-        """Normal matrix, score and chi2 with weights at ``beta``, and the whitened design with its factors."""
+        """Normal matrix, score, chi2, and design with residuals of unit variance; the whitened design, its factors."""
         variance, coupling = row_variance(self.rows, self.D @ beta, beta, noise, self.interval)
         residual = self.rows.V - self.X @ beta
         whitened, d, l = whiten(np.column_stack([self.X, residual]), variance, self.rows.linked, coupling)
@@ -121,7 +122,7 @@ class PhaseProblem:
         gram = scaled.T @ scaled
         normal, score = gram[:-1, :-1] + np.diag(self.prior), gram[:-1, -1] - self.prior * (beta - self.start)
         chi2 = float(gram[-1, -1]) / (len(residual) - len(beta))
-        return normal, score, chi2, np.ascontiguousarray(whitened[:, :-1]), d, l
+        return normal, score, chi2, scaled, np.ascontiguousarray(whitened[:, :-1]), d, l
 
     def first_pass(self, noise: NoiseLevels) -> np.ndarray | None:
         """(unknown,) plain estimate with weights at the start; None where the rows leave an unknown undetermined."""
@@ -137,7 +138,7 @@ class PhaseProblem:
 
     def second_pass(self, beta: np.ndarray, noise: NoiseLevels) -> PhaseFit | None:
         """Estimate with weights at ``beta``, corrected for noisy regressors; None where an unknown is undetermined."""
-        normal, score, chi2, whitened, d, l = self._weigh(beta, noise)
+        normal, score, chi2, scaled, whitened, d, l = self._weigh(beta, noise)
         inverse_X, diagonal, below = unwhiten(whitened, d, l)
         # records quieter than stated, noise-free ones above all, are corrected for the noise that they do have
         correction = min(1.0, chi2) * regressor_noise(
@@ -148,7 +149,8 @@ class PhaseProblem:
             return None
         covariance = np.linalg.inv(normal)
         influence = inverse_X @ covariance * (self.D @ beta * noise.speed)[:, None]
-        return PhaseFit(beta + covariance @ score, covariance, chi2, influence)
+        step = covariance @ score
+        return PhaseFit(beta + step, covariance, chi2, scaled[:, -1] - scaled[:, :-1] @ step, influence)
 
 
 def regressor_noise(rows, D, diagonal, below, noise: NoiseLevels, interval: float, end_measured: bool) -> np.ndarray:

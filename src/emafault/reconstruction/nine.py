@@ -35,12 +35,12 @@ from ..actuator.shape import trapezoid_swept
 from ..closed_form import PHASE_AXIS
 from .factors import backward, factor, forward, project
 from .features import Features, Signals, check_number, read_settings
+from .goodness import by_stretch, stretches
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
 from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise
 from .rows import OFF_HALF_WIDTH, is_zero
 from .weighted import LOOSE_INDUCTANCE, WeightedSettings, fit_runs
 
-STRETCH = np.pi / 12.0  # electrical rad, of rotor angle over which residuals are averaged to judge the fit
 PASSES = 2  # with corrected regressors; a third changes less than a thousandth of a standard error
 FEWEST_FLOATING = 10  # samples of a phase, to tell its offset and the currents' noise
 CLEAR = np.deg2rad(0.2)  # electrical angle kept clear of the edges of the off sector, for the angle's noise
@@ -158,7 +158,7 @@ def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: Nin
         f=np.where(moving, emf / np.where(moving, rate, 1.0), 0.0),
         live=~floating[part],
         live_end=~still[first - 1 :],
-        stretch=np.floor(p * angle[first - 1 : -1] / STRETCH).astype(np.int64),
+        stretch=stretches(p * angle[first - 1 : -1]),
         noise=NoiseLevels(USUAL_VOLTAGE, mean, at_end, rate_noise),
         interval=h,
         dissipated=(np.cumsum(losses) - 0.5 * losses)[part] if s.heating else None,
@@ -250,18 +250,9 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
         step = np.linalg.solve(normal, W.T @ white.ravel())
         beta = beta + step[:UNKNOWNS].reshape(4, 3)
         rate += float(np.sum(step[UNKNOWNS:]))
-    fit, freedom = _by_stretch(r.stretch, white)
+    fit, freedom = by_stretch(r.stretch, white, UNKNOWNS // 3)
     covariance = nine_of(information(replace(r, i=i, end=end), beta, rate, noise))
-    return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, freedom)
-
-
-def _by_stretch(stretch: np.ndarray, white: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(phase,) mean square of white residuals' standardised means over each stay in a stretch; its freedom."""
-    starts = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
-    lengths = np.diff(starts, append=len(stretch))
-    total = np.sum((np.add.reduceat(white, starts, axis=0) / np.sqrt(lengths)[:, None]) ** 2, axis=0)
-    freedom = max(len(starts) - UNKNOWNS // 3, 1)
-    return total / freedom, np.full(3, freedom)
+    return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, np.full(3, freedom))
 
 
 def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from .features import Features, Signals, check_number, read_settings
+from .goodness import by_stretch, stretches
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, PhaseFit, PhaseProblem, join_phases
 from .noise import LEAST_VOLTAGE, NoiseLevels, sensor_noise, stated_noise
 from .rows import Rows, SampleChoice, phase_rows
@@ -112,10 +113,10 @@ def fit_runs(
     end = end_currents(signals)
     prior_L = np.inf if ends else LOOSE_INDUCTANCE * actuator.inductance
     start = nominal_start(actuator, 4 + harmonics)
-    R, k, L, offset, chi2 = (np.full((signals.runs, 3), np.nan) for _ in range(5))
-    samples = np.zeros((signals.runs, 3), np.int64)
+    R, k, L, offset, chi2, fit_of = (np.full((signals.runs, 3), np.nan) for _ in range(6))
+    samples, freedom = np.zeros((signals.runs, 3), np.int64), np.zeros((signals.runs, 3), np.int64)
     covariance = np.full((signals.runs, 6, 6), np.nan)
-    out = Features(R, k, L, offset, covariance, {"chi2": chi2, "samples": samples})
+    out = Features(R, k, L, offset, covariance, {"chi2": chi2, "samples": samples, "fit": fit_of, "freedom": freedom})
 
     def fill() -> Iterator[RunFit]:
         for run in range(signals.runs):
@@ -140,7 +141,11 @@ def fit_runs(
                 array[run] = [fit.beta[column] for fit in fits]
             chi2[run] = [fit.chi2 for fit in fits]
             covariance[run] = join_phases(fits, rows, (CURRENT, EMF))
-            if not ends:
+            if ends:
+                for j, (fit, r) in enumerate(zip(fits, rows)):
+                    stretch = stretches(actuator.pole_pairs * r.theta)
+                    fit_of[run, j], freedom[run, j] = by_stretch(stretch, fit.white, len(fit.beta))
+            else:  # the ripple that is missed is no noise that the samples have each of its own
                 covariance[run] *= max(1.0, float(np.max(chi2[run])))
             yield RunFit(run, rows, fits, noise)
 
@@ -150,8 +155,9 @@ def fit_runs(
 def reconstruct_weighted(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
     """Generalised R, k, L and intercept of each phase with their covariance.
 
-    ``extras``: ``chi2`` (run, phase) residual variance over the one expected from the noise levels, and ``samples``
-    (run, phase).
+    ``extras``: ``chi2`` (run, phase) residual variance over the one expected from the noise levels; ``samples`` (run,
+    phase); ``fit`` (run, phase) mean square of the standardised mean residuals of 15 electrical degrees, chi-squared
+    over its ``freedom`` (run, phase) where the equation holds, whatever the noise, NaN without end currents.
     A run that leaves an unknown of any phase undetermined is NaN throughout.
     """
     s = read_settings(WeightedSettings, settings, "weighted")

@@ -1,0 +1,73 @@
+"""Identification of recordings: what does not fit its equations is said and widens the intervals, by every method."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emafault import config
+from emafault.dataset import simulate_blocks, simulate_recording
+from emafault.faults import FAULT_NAMES
+from emafault.identification.identifier import fit_identifier
+from emafault.identification.recordings import Model, identify_recordings
+from emafault.reconstruction import join_features, reconstruct
+
+FAULT = np.array([0.05, 0.0, 0.02, 0.05, 0.0, 10.0])
+METHODS = {"paper": ("paper", {}), "weighted": ("weighted", {}), "floating": ("weighted", {"floating": True})}
+BENT = "effects.back_emf_shape.h5=0.02"
+
+
+def simulated(*overrides: str, fault: np.ndarray = FAULT):
+    return simulate_recording(config.dataset_spec(config.compose("paper", list(overrides)), "fresh"), fault)
+
+
+@pytest.fixture(scope="module")
+def models(actuator):
+    blocks = list(simulate_blocks(config.dataset_spec(config.compose("paper"), "training"), 0, 75))
+    faults = np.concatenate([block.faults for block in blocks])
+    out = {}
+    for name, (method, settings) in METHODS.items():
+        found = join_features([reconstruct(method, b.signals, b.interval, actuator, settings) for b in blocks])
+        covariance = None if method == "paper" else found.covariance
+        fit = fit_identifier("closed_form", found.inputs, faults, actuator, covariance=covariance)
+        out[name] = Model(f"{name}/closed_form", method, settings, fit.identifier, 0.5)
+    return out
+
+
+def widths(estimate) -> np.ndarray:
+    return np.array([estimate[name]["high"] - estimate[name]["low"] for name in FAULT_NAMES])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_voltages_that_do_not_fit_their_equation_are_told_and_widen_the_intervals(models, method):
+    straight, bent = (identify_recordings(models[method], [simulated(*more)]) for more in ([], [BENT]))
+    assert "equation" not in straight.notes[0]
+    assert "the voltage of phase a, b, c does not fit its equation" in bent.notes[0]
+    wide, narrow = widths(bent.estimates[0]), widths(straight.estimates[0])
+    assert np.all(wide > 3.0 * narrow)
+    assert all(e["low"] < truth < e["high"] for e, truth in zip(bent.estimates[0].values(), FAULT))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_healthy_recording_that_does_not_fit_is_named_and_widens_what_it_calibrates(models, method):
+    healthy = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 10.0])
+    straight, bent = (
+        identify_recordings(models[method], [simulated()], [replace(simulated(*more, fault=healthy), name="healthy")])
+        for more in ([], [BENT])
+    )
+    assert "equation" not in straight.notes[0]
+    assert "healthy: the voltage of phase a, b, c does not fit its equation" in bent.notes[0]
+    assert np.all(widths(bent.estimates[0]) > 2.0 * widths(straight.estimates[0]))
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_the_fit_of_simulated_recordings_is_that_of_noise(actuator, floating):
+    blocks = simulate_blocks(config.dataset_spec(config.compose("paper"), "fresh"), 0, 50)
+    found = join_features(
+        [reconstruct("weighted", b.signals, b.interval, actuator, {"floating": floating}) for b in blocks]
+    )
+    fit, freedom = found.extras["fit"], found.extras["freedom"]
+    # standard errors of a mean of chi-squared over its freedom
+    assert np.mean(fit) == pytest.approx(1.0, abs=3.5 * np.sqrt(2.0 / np.sum(freedom)))
+    scatter = (fit - 1.0) / np.sqrt(2.0 / freedom)
+    assert np.std(scatter) == pytest.approx(1.0, abs=3.5 / np.sqrt(2.0 * scatter.size))
