@@ -69,7 +69,8 @@ class Identifier:
     def prior(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Mean and covariance of R0, k0, L0 of any unit, for ``calibrate``; None where nothing is left open."""
         covariance, mean = self.known.covariance(), nominal_nine(self.actuator)
-        if not np.any(covariance):
+        biased = self.network is None and self.noise is not None  # about the unit, by what no network has learnt
+        if biased or not np.any(covariance):
             return None
         if self.healthy is not None:
             mean[: len(self.healthy)] = self.healthy
@@ -426,13 +427,15 @@ def fit_identifier(
         scale = nominal_nine(actuator)[:scaled] / units[:, :scaled]
         nominal[:, :scaled] *= scale
         spread = None if covariance is None else covariance * scale[:, :, None] * scale[:, None, :]
+    # nine features leave more than a fault, by which a network learns to weigh them where units differ; six do not
+    learnt = features if scaled == 9 else nominal
     if covariance is None and scaled == 6:
         ratio = over_laws(nominal, faults, actuator, alpha_m, lag)
         noise = np.cov(ratio / np.mean(ratio, axis=0), rowvar=False) + LEAST_NOISE * np.eye(6)
         identifier = replace(identifier, noise=noise)
     trained = None
     if estimator == "network":
-        trained = train(features, faults, network, training, seed)
+        trained = train(learnt, faults, network, training, seed)
         healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
         identifier = replace(identifier, network=trained.network, healthy=healthy)
 
@@ -453,7 +456,7 @@ def fit_identifier(
         parts = []
         for fold, left_out in enumerate(np.array_split(order, folds)):
             rest = np.setdiff1d(order, left_out)
-            model = train(features[rest], faults[rest], network, training, seed + 1000 * (fold + 1))
+            model = train(learnt[rest], faults[rest], network, training, seed + 1000 * (fold + 1))
             parts.append(residuals_of(replace(identifier, network=model.network), left_out))
         residuals = np.concatenate([part[0] for part in parts])
         variance = None if covariance is None else np.concatenate([v for _, v in parts if v is not None])
