@@ -34,8 +34,8 @@ def identify_several(spec: Mapping[str, Any], output: str | Path) -> None:
     Parameters
     ----------
     spec : the sub-tree ``config.several_spec``
-    output : JSON file: a list with ``experiment``, ``features`` (six or nine), ``count`` of recordings, ``errors`` and
-        ``bound`` (mean absolute, of N, xi and dT) and ``coverage`` of 90 % intervals
+    output : JSON file: a list with ``experiment``, ``features`` (six or nine), ``count`` of recordings, ``units``,
+        ``errors`` and ``bound`` (mean absolute, of N, xi and dT) and ``coverage`` of 90 % intervals
     """
     write_json(output, [entry for own in spec["experiments"] for entry in _of_experiment(own, spec["settings"])])
 
@@ -72,6 +72,7 @@ def _of_experiment(own: Mapping[str, Any], settings: Mapping[str, Any]) -> list[
                     "experiment": own["name"],
                     "features": features,
                     "count": count,
+                    "units": units,
                     "errors": _by_group(error),
                     "bound": _by_group(MAE * lowest),
                     "coverage": float(np.mean(error < HALF_WIDTH * spread)),
