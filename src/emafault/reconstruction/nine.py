@@ -250,7 +250,8 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
         step = np.linalg.solve(normal, W.T @ white.ravel())
         beta = beta + step[:UNKNOWNS].reshape(4, 3)
         rate += float(np.sum(step[UNKNOWNS:]))
-    fit, freedom = by_stretch(r.stretch, white, UNKNOWNS // 3)
+    level = np.mean(white**2) if stated is None else 1.0  # as in ``weighted``
+    fit, freedom = by_stretch(r.stretch, white / np.sqrt(level), UNKNOWNS // 3)
     covariance = nine_of(information(replace(r, i=i, end=end), beta, rate, noise))
     return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, np.full(3, freedom))
 

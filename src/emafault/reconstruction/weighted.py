@@ -142,9 +142,12 @@ def fit_runs(
             chi2[run] = [fit.chi2 for fit in fits]
             covariance[run] = join_phases(fits, rows, (CURRENT, EMF))
             if ends:
+                # where the end currents' noise is most of all, what is left for the voltage's is estimated roughly
+                level = float(np.mean(chi2[run])) if estimated else 1.0
                 for j, (fit, r) in enumerate(zip(fits, rows)):
                     stretch = stretches(actuator.pole_pairs * r.theta)
-                    fit_of[run, j], freedom[run, j] = by_stretch(stretch, fit.white, len(fit.beta))
+                    white = fit.white / np.sqrt(level)
+                    fit_of[run, j], freedom[run, j] = by_stretch(stretch, white, len(fit.beta))
             else:  # the ripple that is missed is no noise that the samples have each of its own
                 covariance[run] *= max(1.0, float(np.max(chi2[run])))
             yield RunFit(run, rows, fits, noise)
