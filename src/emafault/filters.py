@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 FILTERS = ("none", "first_order", "moving_average")
 FILTERED = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed")
@@ -55,6 +54,8 @@ def coefficients(interval: float, settings: Mapping[str, Any]) -> tuple[np.ndarr
 def _through(
     signals: Mapping[str, np.ndarray], numerator: np.ndarray, denominator: np.ndarray
 ) -> dict[str, np.ndarray]:
+    from scipy.signal import lfilter  # its import takes longer than many a job
+
     return {
         name: lfilter(numerator, denominator, values, axis=1) if name in FILTERED else values
         for name, values in signals.items()

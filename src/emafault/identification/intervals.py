@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
 
 from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
@@ -47,7 +46,9 @@ class ConformalIntervals:
     @classmethod
     def gaussian(cls, method: str) -> "ConformalIntervals":
         """Scores of Gaussian errors of exactly the variance that they are told, none being calibrated on rows."""
-        quantiles = np.sort(np.abs(norm.ppf((np.arange(GAUSSIAN_ROWS) + 0.5) / GAUSSIAN_ROWS)))
+        from scipy.special import ndtri  # its import takes longer than the training of most networks
+
+        quantiles = np.sort(np.abs(ndtri((np.arange(GAUSSIAN_ROWS) + 0.5) / GAUSSIAN_ROWS)))
         outputs = len(FAULT_NAMES)
         scores = np.repeat(quantiles[:, None], outputs, axis=1)
         return cls(method, scores, np.full(outputs, 1e-24), np.full(outputs, np.nan))

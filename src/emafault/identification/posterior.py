@@ -16,7 +16,6 @@ be (Paule and Mandel, J. Res. Natl. Bur. Stand. 87, 1982, 377).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..actuator.parameters import ActuatorParameters
 from ..closed_form import ECCENTRICITY_AXES, forward, inductance, inverse
@@ -137,9 +136,11 @@ def model_error(
 
     Arguments are those of :func:`posterior`.
     """
+    from scipy.special import chdtri
+
     found = posterior(nine, covariance, actuator, alpha_m, known)
     out = np.zeros(len(nine))
-    off = np.flatnonzero(found.misfit > chi2.isf(CHANCE, FREEDOM))
+    off = np.flatnonzero(found.misfit > chdtri(FREEDOM, CHANCE))
     y, noise = nine[off], covariance[off]
     low, high = np.zeros(len(off)), np.full(len(off), LARGEST_ERROR)
     for _ in range(HALVINGS if len(off) else 0):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtri
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
@@ -143,13 +143,13 @@ def _as_one(
         unit,
         unit_covariance,
     )
-    if len(recordings) > 1 and found.misfit > chi2.isf(CHANCE, found.freedom):
+    if len(recordings) > 1 and found.misfit > chdtri(found.freedom, CHANCE):
         worst = recordings[int(np.argmax(found.shares))].name
         raise InputError(
             f"{worst}: fits no fault that the other recordings have too (chi-squared {found.misfit:.0f} of all with "
             f"{found.freedom} degrees of freedom); without --together each is identified by itself"
         )
-    half = norm.ppf(0.5 + 0.5 * level) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    half = ndtri(0.5 + 0.5 * level) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
     return [
         {
             name: {"value": float(x[j]), "low": float(x[j] - h[j]), "high": float(x[j] + h[j])}
@@ -190,7 +190,7 @@ def _unexplained(recording: Recording, own: Features, identifier: Identifier) ->
         said.append(
             "no end currents are recorded, the inductance is not told: intervals are about those of six features"
         )
-    poor = np.flatnonzero(fit * freedom > chi2.isf(CHANCE, np.maximum(freedom, 1)))
+    poor = np.flatnonzero(fit * freedom > chdtri(np.maximum(freedom, 1), CHANCE))
     if not len(poor):
         return 0.0, said
     phases = ", ".join(PHASES[j] for j in poor)

@@ -6,20 +6,24 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
-from .angle_resolved import reconstruct_angle_resolved
 from .features import Features, Signals, join_features, read_signals
-from .nine import reconstruct_nine
-from .paper import reconstruct_paper
-from .weighted import reconstruct_weighted
 
 __all__ = ["METHODS", "Features", "join_features", "reconstruct"]
 
-METHODS: dict[str, Callable[[Signals, ActuatorParameters, Mapping], Features]] = {
-    "paper": reconstruct_paper,
-    "weighted": reconstruct_weighted,
-    "angle_resolved": reconstruct_angle_resolved,
-    "nine": reconstruct_nine,
-}
+METHODS = ("paper", "weighted", "angle_resolved", "nine")
+
+
+def _function(method: str) -> Callable[[Signals, ActuatorParameters, Mapping], Features]:
+    """Function of a method; importing it takes longer than many a job that only reads features."""
+    if method == "paper":
+        from .paper import reconstruct_paper as function
+    elif method == "weighted":
+        from .weighted import reconstruct_weighted as function
+    elif method == "angle_resolved":
+        from .angle_resolved import reconstruct_angle_resolved as function
+    else:
+        from .nine import reconstruct_nine as function
+    return function
 
 
 def reconstruct(
@@ -41,7 +45,7 @@ def reconstruct(
     """
     if method not in METHODS:
         raise InputError(f"reconstruction.method: got '{method}', accepted are {', '.join(METHODS)}")
-    features = METHODS[method](read_signals(signals, interval), actuator, settings)
+    features = _function(method)(read_signals(signals, interval), actuator, settings)
     if len(features.R) and not np.any(features.identified):
         raise InputError(
             f"reconstruction '{method}': no record determines R and k of all three phases; a motion of at least one "

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from ..actuator.parameters import ActuatorParameters
 from ..compiled import compiled
@@ -97,6 +96,8 @@ def reconstruct_paper(signals: Signals, actuator: ActuatorParameters, settings: 
     ------
     InputError : a recording interval too long for the low-pass, or a record too short
     """
+    from scipy.signal import butter, sosfiltfilt
+
     s = read_settings(PaperSettings, settings, "paper")
     check_number("paper", "cutoff", s.cutoff, 1e-3)
     check_number("paper", "discard", s.discard, 0.0)
