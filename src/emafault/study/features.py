@@ -189,16 +189,18 @@ def read_features(path: str | Path) -> FeatureTable:
     ------
     InputError : no such file, or not one of these
     """
-    import xarray as xr
+    import netCDF4
 
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file")
     try:
-        with xr.open_dataset(path, engine="netcdf4") as data:
-            kept = ("xi", "nine_covariance")
-            extras = {name: data[f"extra_{name}"].values for name in kept if f"extra_{name}" in data.variables}
-            R, k, L, offset, covariance = (data[n].values for n in (*_UNITS, "covariance"))
+        with netCDF4.Dataset(path) as file:
+            file.set_auto_mask(False)
+            data = file.variables
+            kept = [name for name in ("xi", "nine_covariance") if f"extra_{name}" in data]
+            extras = {name: data[f"extra_{name}"][:] for name in kept}
+            R, k, L, offset, covariance = (data[n][:] for n in (*_UNITS, "covariance"))
             features = Features(R, k, L, offset, covariance, extras)
-            return FeatureTable(features, data["fault"].values, data["ambient_temperature"].values)
-    except (OSError, KeyError, ValueError) as error:
+            return FeatureTable(features, data["fault"][:], data["ambient_temperature"][:])
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise InputError(f"{path}: not a readable table of features ({error})") from error
