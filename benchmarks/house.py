@@ -13,11 +13,11 @@ PARTS = ("workflow", "profiles", "conf", "src", "data")
 NOT_RESULTS = ("logs", "benchmarks", "mlflow_artifacts", "diagnoses")
 
 
-def build(folder: Path) -> Path:
-    """Copy what the workflow needs, without results."""
+def build(folder: Path, root: Path = ROOT) -> Path:
+    """Copy what the workflow needs, without results, of the project or of another copy."""
     for part in PARTS:
-        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
-    shutil.copy(ROOT / "Snakefile", folder)
+        shutil.copytree(root / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+    shutil.copy(root / "Snakefile", folder)
     return folder
 
 

@@ -481,6 +481,21 @@ def bench_files(bench: str) -> list[str]:
     return files
 
 
+def command_files(config: Mapping[str, Any]) -> list[str]:
+    """The file that the command is read from, if it is given as one, for the workflow.
+
+    Raises
+    ------
+    InputError : a path with braces, which Snakemake reads as wildcards
+    """
+    command = config["command"]
+    if command["name"] != "file":
+        return []
+    if set(command["path"]) & set("{}"):
+        raise InputError(f"command.path: {shown(command['path'])}: the workflow accepts no braces")
+    return [command["path"]]
+
+
 @functools.cache
 def batches(folder: str) -> list[list[str]]:
     """Benches of a fleet, folders of recordings in a folder, in the batches that jobs diagnose.

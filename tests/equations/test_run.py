@@ -11,7 +11,9 @@ import pytest
 from emafault.cli import main
 from emafault.config import compose, diagnosis_spec, retraining_spec
 from emafault.equations.run import diagnose_folder
+from emafault.errors import InputError
 from emafault.io.recording import write_recording
+from emafault.reporting.retrained import write_with_section
 from emafault.reporting.written import SCHEMA_FILE
 from emafault.study.retrain import retrain_network
 
@@ -95,10 +97,14 @@ def test_the_fix_is_an_experiment_that_composes(written, verdict):
 def test_retraining_takes_the_verdict(written):
     spec = retraining_spec(compose(overrides=["sampling.runs=120", "evaluation.seeds=1"]))
     out = written / "out"
-    retrain_network(written / "bench", out, spec, out / "retrained.json")
+    files = [out / name for name in ("diagnosis.json", "report.html", "retrained.json", "retrained.html")]
+    before = files[1].read_bytes()
+    retrain_network(written / "bench", *files[:2], spec, *files[2:])
     found = json.loads((out / "retrained.json").read_text())
     assert found["after"]["rms"] < found["before"]["rms"]
-    assert "What retraining brought" in (out / "report.html").read_text()
+    assert "What retraining brought" in files[3].read_text() and files[1].read_bytes() == before
+    with pytest.raises(InputError, match=r"retrained\.html: not the report of a diagnosis"):
+        write_with_section(files[3], found, files[3])
 
 
 def test_the_same_input_gives_the_same_and_what_is_excluded_is_not_in_the_library(written, verdict):

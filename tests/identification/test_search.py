@@ -24,6 +24,11 @@ search.run_worker(sys.argv[2], settings, data["x"], data["f"], data["w"], worker
 """
 
 
+def summarise(storage, wanted, *data):
+    """Finished trials of a storage, those on the Pareto front marked."""
+    return search.ranked(search.finished(storage, wanted, *data), wanted.trials)
+
+
 @pytest.fixture(scope="module")
 def data(make_set, width):
     known = make_set(150, 1)
@@ -39,7 +44,7 @@ def test_one_worker_is_reproducible_and_the_front_is_one(data, tmp_path, sampler
     runs = []
     for name in ("a", "b"):
         assert search.run_worker(tmp_path / name, settings(sampler=sampler), *data) == 6
-        runs.append(search.summarise(tmp_path / name, settings(sampler=sampler), *data))
+        runs.append(summarise(tmp_path / name, settings(sampler=sampler), *data))
     assert [(t.error, t.parameters, t.network) for t in runs[0]] == [
         (t.error, t.parameters, t.network) for t in runs[1]
     ]
@@ -57,9 +62,9 @@ def test_only_what_is_missing_is_run(data, tmp_path):
     assert seen[0] == (0, 3) and seen[-1] == (3, 3)
     assert search.run_worker(journal, settings(5), *data) == 2
     assert search.run_worker(journal, settings(5), *data) == 0
-    assert len(search.summarise(journal, settings(5), *data)) == 5
+    assert len(summarise(journal, settings(5), *data)) == 5
     other = data[0] + 1e-3, *data[1:]  # other data: another study in the same file
-    assert search.summarise(journal, settings(5), *other) == []
+    assert summarise(journal, settings(5), *other) == []
 
 
 def test_workers_share_a_journal_and_resume_after_a_kill(data, tmp_path):
@@ -80,12 +85,12 @@ def test_workers_share_a_journal_and_resume_after_a_kill(data, tmp_path):
     victim.wait()
     with open(journal, "ab") as file:  # what a kill in the middle of a write leaves
         file.write(b'{"op_code":6,"tri')
-    done = len(search.summarise(journal, search.SearchSettings(**plain), *data))
+    done = len(summarise(journal, search.SearchSettings(**plain), *data))
     assert 1 <= done < 40
     asked = done + 5
     workers = [start(number, asked) for number in (1, 2)]
     assert [worker.wait(timeout=120) for worker in workers] == [0, 0]
-    trials = search.summarise(journal, search.SearchSettings(**plain), *data)
+    trials = summarise(journal, search.SearchSettings(**plain), *data)
     assert len(trials) == asked  # neither fewer for the killed trial nor more for the second worker
 
 
@@ -101,7 +106,7 @@ def test_a_search_that_was_killed_goes_on_as_it_would_have(data, tmp_path):
     with pytest.raises(Killed):
         search.run_worker(tmp_path / "killed", settings(8), *data, progress=kill)
     search.run_worker(tmp_path / "killed", settings(8), *data)
-    whole, killed = (search.summarise(tmp_path / name, settings(8), *data) for name in ("whole", "killed"))
+    whole, killed = (summarise(tmp_path / name, settings(8), *data) for name in ("whole", "killed"))
     assert [(t.error, t.network, t.training) for t in whole] == [(t.error, t.network, t.training) for t in killed]
 
 
@@ -117,7 +122,7 @@ def test_a_trial_that_another_worker_told_failed_does_not_end_its_owner(data, tm
 
     monkeypatch.setattr(search, "trial_error", error)
     assert search.run_worker(tmp_path / "journal", settings(3), *data) == 3
-    assert told and told[0] not in [t.number for t in search.summarise(tmp_path / "journal", settings(3), *data)]
+    assert told and told[0] not in [t.number for t in summarise(tmp_path / "journal", settings(3), *data)]
 
 
 def test_a_trial_of_another_host_is_abandoned_once_its_heartbeat_stops(data, tmp_path, monkeypatch):
@@ -140,7 +145,7 @@ def test_a_trial_of_another_host_is_abandoned_once_its_heartbeat_stops(data, tmp
 def test_another_storage_is_a_setting(data, tmp_path):
     url = f"sqlite:///{tmp_path}/search.db"
     assert search.run_worker(url, settings(2), *data) == 2
-    assert len(search.summarise(url, settings(2), *data)) == 2
+    assert len(summarise(url, settings(2), *data)) == 2
     with pytest.raises(InputError, match="not a usable search storage"):
         search.open_study("nonsense://there", "name")
 

@@ -4,10 +4,12 @@ import json
 
 import pytest
 
+from emafault.config import withheld_spec
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
 from emafault.study import blind
-from emafault.study.blind import companions, run_cases
+from emafault.study.blind import companions, run_batch, run_cases
+from emafault.study.scored import unpack
 
 
 @pytest.fixture
@@ -53,3 +55,23 @@ def test_a_diagnosis_that_fails_is_a_verdict_of_its_own(asked, tmp_path):
     assert verdict["verdict"] == "failed" and "cannot be used" in verdict["error"]
     key = json.loads((tmp_path / "keys" / f"{left_out.name}.json").read_text())
     assert key["case"]["left_out"] == list(shown.effects)
+
+
+def test_what_a_job_writes_is_all_that_scoring_needs(asked, tmp_path):
+    spec = withheld_spec("smallest", "T7", 0)
+    spec["seeds"] |= {"first": 5, "last": 6, "told": [5]}
+    run_batch(tmp_path / "made" / "T7_0.json", spec, "0123456789abcdef")
+    cases = tmp_path / "made" / "cases_01234567"
+    unpack(tmp_path / "made" / "T7_0.json", tmp_path / "elsewhere")
+    for folder in ("keys", "diagnoses", "oracles"):
+        made = {p.relative_to(cases): p.read_bytes() for p in (cases / folder).rglob("*.json")}
+        there = tmp_path / "elsewhere"
+        assert made and made == {p.relative_to(there): p.read_bytes() for p in (there / folder).rglob("*.json")}
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"files": {"../outside.json": "x"}}', '{"files": 5}'])
+def test_a_file_of_another_kind_is_refused_and_nothing_is_written_outside(tmp_path, content):
+    (tmp_path / "batch.json").write_text(content)
+    with pytest.raises(InputError, match=r"batch\.json"):
+        unpack(tmp_path / "batch.json", tmp_path / "into")
+    assert not (tmp_path / "outside.json").exists()

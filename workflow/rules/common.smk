@@ -12,11 +12,18 @@ from emafault.places import refuse_folder
 from emafault.reporting import times
 
 RESULTS = "results"
+# where results are in the end; with a storage provider they are in the working folder only while they are used
+stored = workflow.storage_settings
+KEPT = (
+    os.path.join(stored.default_storage_prefix or "", RESULTS) if stored.default_storage_provider == "fs" else RESULTS
+)
 
 try:
     configuration.check_call(config)
     PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
-    refuse_folder(RESULTS)
+    refuse_folder(KEPT)
+    for case in PLAN.cases:
+        configuration.command_files(case.config)
 except InputError as error:
     sys.exit(f"emafault: {one_line(error)}")
 
@@ -57,17 +64,17 @@ def more(first):
 
 onstart:
     try:
-        provenance.claim(RESULTS)
+        provenance.claim(KEPT)
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
 
 
 onsuccess:
-    times.write(f"{RESULTS}/benchmarks")
+    times.write(f"{KEPT}/benchmarks")
 
 
 onerror:
-    times.write(f"{RESULTS}/benchmarks")
+    times.write(f"{KEPT}/benchmarks")
 
 
 # --- datasets and features ---
@@ -75,6 +82,15 @@ onerror:
 
 def dataset_spec(wildcards):
     return PLAN.dataset(wildcards.dataset, wildcards.part)
+
+
+def command_of_dataset(wildcards):
+    """The file that a command is read from, if it is given as one; no storage provider is asked for it."""
+    return [local(path) for path in configuration.command_files(dataset_spec(wildcards))]
+
+
+def command_of_case(wildcards):
+    return [local(path) for path in configuration.command_files(composed(wildcards))]
 
 
 def shards(case, part):
@@ -230,7 +246,10 @@ def data_of_case(wildcards):
 # --- benches and blind cases ---
 
 BENCH = str(config.get("bench", "")).rstrip("/")
+TWIN = str(config.get("twin", "actuator"))
 DIAGNOSIS = f"{RESULTS}/diagnoses/{configuration.bench_name(BENCH)}"
+# only what was named of the actuator can be handed to the next experiment
+DIAGNOSED = {"experiment": f"{DIAGNOSIS}/experiment.yaml"} if TWIN == "actuator" else {}
 WITHHELD = f"{RESULTS}/withheld"
 CALIBRATED = configuration.actuator_name(config.get("overrides", ""))[0]
 CALIBRATION = f"{RESULTS}/calibration/{CALIBRATED}"
@@ -240,16 +259,16 @@ FLEET = f"{RESULTS}/fleets/{FLEET_NAME}"
 
 
 def bench_files(wildcards):
-    """The files of the bench; with a storage provider, copies of them."""
+    """The files of the bench, where they are: no storage provider is asked for them."""
     try:
-        return configuration.bench_files(BENCH)
+        return [local(path) for path in configuration.bench_files(BENCH)]
     except InputError as error:
         sys.exit(f"emafault: {one_line(error)}")
 
 
 def batch_files(wildcards):
     """The files of a batch of a fleet."""
-    return configuration.batch_files(configuration.batches(BENCHES)[int(wildcards.batch)])
+    return [local(path) for path in configuration.batch_files(configuration.batches(BENCHES)[int(wildcards.batch)])]
 
 
 def fleet_batches(wildcards):

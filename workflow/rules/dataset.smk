@@ -21,7 +21,8 @@ rule compile_simulation:
 
 rule simulate_shard:
     input:
-        rules.compile_simulation.output,
+        compiled=rules.compile_simulation.output,
+        command=command_of_dataset,
     output:
         f"{RESULTS}/datasets/{{dataset}}/{{part}}/shard_{{shard}}.nc",
     log:

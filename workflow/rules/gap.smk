@@ -11,6 +11,7 @@ rule diagnose_gap:
         calibration=config.get("calibration") or [],
         compiled=rules.compile_simulation.output,
     output:
+        **DIAGNOSED,
         verdict=f"{DIAGNOSIS}/diagnosis.json",
         report=f"{DIAGNOSIS}/report.html",
     log:
@@ -24,7 +25,7 @@ rule diagnose_gap:
         tracking=1,
     params:
         is_folder=os.path.isdir(BENCH),
-        twin=str(config.get("twin", "actuator")),
+        twin=TWIN,
         spec=configuration.diagnosis_spec(PLAN.cases[0].config),
         code=code("diagnose_gap"),
     script:
@@ -35,8 +36,10 @@ rule retrain_network:
     input:
         files=bench_files,
         verdict=rules.diagnose_gap.output.verdict,
+        report=rules.diagnose_gap.output.report,
     output:
-        f"{DIAGNOSIS}/retrained.json",
+        result=f"{DIAGNOSIS}/retrained.json",
+        report=f"{DIAGNOSIS}/retrained.html",
     log:
         f"{RESULTS}/logs/diagnoses/{configuration.bench_name(BENCH)}/retrain_network.log",
     benchmark:

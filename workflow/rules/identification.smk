@@ -23,8 +23,7 @@ rule search_network:
 
 rule choose_network:
     input:
-        features=training_features,
-        workers=searching_workers,
+        searching_workers,
     output:
         trials=f"{CASE}/search/trials.json",
         chosen=f"{CASE}/search/chosen.json",
@@ -38,7 +37,6 @@ rule choose_network:
     params:
         spec=search_spec,
         code=code("choose_network"),
-        storage=search_storage,
     script:
         "../scripts/choose_network.py"
 

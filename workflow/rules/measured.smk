@@ -4,10 +4,10 @@ MEASURED = "data/measured"
 
 rule diagnose_machines:
     input:
-        sets=f"{MEASURED}/sets.yaml",
-        nameplate=f"{MEASURED}/nameplate.yaml",
+        sets=local(f"{MEASURED}/sets.yaml"),
+        nameplate=local(f"{MEASURED}/nameplate.yaml"),
         files=[
-            f"{MEASURED}/{path}"
+            local(f"{MEASURED}/{path}")
             for path in glob_wildcards(f"{MEASURED}/{{path}}").path
             if path.endswith((".npz", ".csv.gz"))
         ],

@@ -43,7 +43,8 @@ rule reconstruct_features:
 
 rule compute_bound:
     input:
-        rules.compile_simulation.output,
+        compiled=rules.compile_simulation.output,
+        command=command_of_case,
     output:
         f"{CASE}/bound.nc",
     log:

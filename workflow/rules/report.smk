@@ -18,7 +18,8 @@ rule write_configuration:
 
 rule simulate_examples:
     input:
-        rules.compile_simulation.output,
+        compiled=rules.compile_simulation.output,
+        command=command_of_case,
     output:
         f"{CASE}/examples.nc",
     log:

@@ -34,6 +34,7 @@ rule score_cases:
     output:
         report=f"{WITHHELD}/{{draw}}/scoreboard.html",
         scores=f"{WITHHELD}/{{draw}}/scores.json",
+        figures=[f"{WITHHELD}/{{draw}}/{name}.png" for name in ("confusion", "reliability", "power", "closure")],
     log:
         f"{RESULTS}/logs/withheld/{{draw}}/score_cases.log",
     benchmark:

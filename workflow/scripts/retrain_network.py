@@ -6,7 +6,7 @@ from emafault.progress import one_line_errors
 from emafault.study.retrain import retrain_network
 
 with one_line_errors(snakemake.log[0]):
-    params = snakemake.params
-    bench = Path(snakemake.input.files[0])
+    given, params, out = snakemake.input, snakemake.params, snakemake.output
+    bench = Path(given.files[0])
     bench = bench.parent if params.is_folder else bench
-    retrain_network(str(bench), Path(snakemake.input.verdict).parent, params.spec, snakemake.output[0])
+    retrain_network(bench, given.verdict, given.report, params.spec, out.result, out.report)

@@ -10,7 +10,7 @@ from ..faults import FAULT_NAMES
 from ..reporting.numbers import Numbers, add_numbers
 from ..reporting.page import Page
 from ..reporting.panels import Panel
-from ..reporting.retrained import MARKS
+from ..reporting.retrained import MARK
 from .electrical import NAMES
 from .probabilities import basis
 from .quality import in_cells
@@ -105,7 +105,7 @@ class Detail:
     numbers: Numbers
 
 
-def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, detail: Detail | None = None) -> Page:
+def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], detail: Detail | None = None) -> Page:
     """The page of one diagnosis."""
     # what draws takes half a second to import, and the verdict does not wait
     from ..reporting import diagnosis as figures
@@ -209,7 +209,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], retrained: str, 
             figures.draw_faults(fault_vectors(verdict, truths)),
             "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
         )
-    page.parts.append(f"{MARKS[0]}{retrained}{MARKS[1]}")
+    page.parts.append(MARK)
     page.heading("What to record next")
     rows = [
         [

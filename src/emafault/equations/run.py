@@ -13,7 +13,6 @@ from ..io.split import split_bench
 from ..paths import CONF, results_folder
 from ..places import file_name
 from ..plain import read_yaml
-from ..reporting.retrained import section
 from ..reporting.written import EXPERIMENT, REPORT, VERDICT, aside, checked, refuse_foreign
 from .corrected import write_corrected
 from .curves import panels
@@ -130,7 +129,7 @@ def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path |
     last = checked(verdict)
     truths = {n: r.fault for n, r in bench.recordings.items()}
     detail = Detail(panels(found), numbers(found))
-    draw(verdict, truths, section(folder, verdict), detail).write(folder / REPORT)
+    draw(verdict, truths, detail).write(folder / REPORT)
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)

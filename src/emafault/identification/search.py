@@ -11,8 +11,8 @@ import json
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -353,22 +353,36 @@ def _sampler(settings: SearchSettings, worker: int, complete: int, repeated: int
     return optuna.samplers.NSGAIISampler(seed=seed, population_size=max(4, min(20, settings.trials // 3)))
 
 
-def summarise(
+def finished(
     storage: str | Path, settings: SearchSettings, features: np.ndarray, faults: np.ndarray, width: np.ndarray
 ) -> list[Trial]:
-    """Finished trials in the order of their numbers, at most the asked number, those on the Pareto front marked."""
+    """Finished trials in the order of their numbers, none of them marked.
+
+    Raises
+    ------
+    InputError : an unusable storage
+    """
     from optuna.trial import TrialState
 
     study = open_study(storage, study_name(settings, features, faults, width))
-    finished = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))[: settings.trials]
-    points = [(t.values[0], int(t.values[1])) for t in finished]
-    out: list[Trial] = []
-    for trial, (error, parameters) in zip(finished, points):
-        beaten = any(e <= error and p <= parameters and (e, p) != (error, parameters) for e, p in points)
-        beaten = beaten or (error, parameters) in points[: len(out)]  # of equals the first
+    out = []
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)):
         network, training = settings.settings(trial.params)
         seconds = trial.duration.total_seconds() if trial.duration else float("nan")
-        out.append(Trial(trial.number, error, parameters, network.as_dict(), training.as_dict(), seconds, not beaten))
+        error, parameters = trial.values[0], int(trial.values[1])
+        out.append(Trial(trial.number, error, parameters, network.as_dict(), training.as_dict(), seconds))
+    return out
+
+
+def ranked(trials: Iterable[Trial], asked: int) -> list[Trial]:
+    """The asked number of trials at most, the first by number, those on the Pareto front marked."""
+    first = sorted(trials, key=lambda trial: trial.number)[:asked]
+    points = [(trial.error, trial.parameters) for trial in first]
+    out: list[Trial] = []
+    for trial, (error, parameters) in zip(first, points):
+        beaten = any(e <= error and p <= parameters and (e, p) != (error, parameters) for e, p in points)
+        beaten = beaten or (error, parameters) in points[: len(out)]  # of equals the first
+        out.append(replace(trial, pareto=not beaten))
     return out
 
 

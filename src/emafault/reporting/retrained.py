@@ -1,25 +1,15 @@
 """The section of the report that shows what retraining with what a diagnosis found has brought."""
 
 import html
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from ..io.atomic import write_text
 
-FILE = "retrained.json"
-#: what the section stands between in the page
-MARKS = ("<!-- retrained -->", "<!-- /retrained -->")
-
-
-def section(folder: Path, verdict: Mapping[str, Any]) -> str:
-    """HTML of the section; empty where nothing was retrained for this very verdict."""
-    try:
-        found = json.loads((folder / FILE).read_text())
-    except (OSError, ValueError):
-        return ""
-    return section_of(found) if found.get("digest") == verdict["digest"] else ""
+#: where the section belongs in a report
+MARK = "<!-- retrained -->"
 
 
 def section_of(found: Mapping[str, Any]) -> str:
@@ -44,18 +34,17 @@ def section_of(found: Mapping[str, Any]) -> str:
     return f"<h2>What retraining brought</h2><p>{html.escape(text)}</p>{table}"
 
 
-def show_in_report(path: Path, found: Mapping[str, Any]) -> None:
-    """Put the section into a report that stands already.
+def write_with_section(report: str | Path, found: Mapping[str, Any], page: str | Path) -> None:
+    """Write a report once more, with the section.
 
     Raises
     ------
-    InputError : the report cannot be written
+    InputError : no report of a diagnosis, or a page that cannot be written
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError:
-        return
-    start, end = text.find(MARKS[0]), text.find(MARKS[1])
-    if start >= 0 and end >= 0:
-        whole = text[: start + len(MARKS[0])] + section_of(found) + text[end:]
-        write_text(path, whole)
+        text = Path(report).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{report}: not a report ({error})") from error
+    if MARK not in text:
+        raise InputError(f"{report}: not the report of a diagnosis of the actuator")
+    write_text(page, text.replace(MARK, section_of(found), 1))

@@ -107,9 +107,10 @@ def folder_of(output: Path, code: str) -> Path:
 
 
 def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
-    """Run one job of a draw and write where its cases stand.
+    """Run one job of a draw and write its cases: their names, and their keys and verdicts by path.
 
-    Cases are kept per version of the code: a killed job goes on where it was, one whose code changed starts anew.
+    Cases are kept beside it per version of the code: a killed job goes on where it was, one whose code changed starts
+    anew.
     """
     seeds = spec["seeds"]
     folder = folder_of(output, code)
@@ -118,8 +119,16 @@ def run_batch(output: Path, spec: Mapping[str, Any], code: str) -> None:
     span = range(seeds["first"], seeds["last"])
     beside = {name: seeds[name] for name in ("again", "told", "rivals")}
     names = run_cases(seeds["rung"], span, folder, actuator, noise, **beside, population=population)
-    text = json.dumps({"folder": folder.name, "cases": names})
+    files = [path for name in names for path in case_files(folder, name) if path.exists()]
+    kept = {path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8") for path in files}
+    text = json.dumps({"folder": folder.name, "cases": names, "files": kept})
     write_text(output, text)
+
+
+def case_files(folder: Path, name: str) -> list[Path]:
+    """Key and verdicts of a case, which need not all be there."""
+    verdicts = [folder / kind / name / "diagnosis.json" for kind in ("diagnoses", "oracles")]
+    return [folder / "keys" / f"{name}.json", *verdicts]
 
 
 def diagnose_bench(

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
 from ..identification.posterior import Knowledge
-from ..identification.search import SearchSettings, choose, run_worker, summarise
+from ..identification.search import SearchSettings, Trial, choose, finished, ranked, run_worker
 from ..io.atomic import write_text
 from ..plain import read_json
 from ..progress import progress, say
@@ -110,6 +110,9 @@ def search_settings(spec: Mapping[str, Any]) -> SearchSettings:
 def search_network(features: str, spec: Mapping[str, Any], storage: str, worker: int, output: str) -> None:
     """Run one worker of the search until the asked number of trials is finished.
 
+    ``output`` gets every trial that has finished by then, the other workers' too: what follows need not reach the
+    storage, which may be a journal on another node.
+
     Raises
     ------
     InputError : an unusable storage or space
@@ -117,28 +120,49 @@ def search_network(features: str, spec: Mapping[str, Any], storage: str, worker:
     table = read_features(features).identified()
     last = [-1]
 
-    def tell(finished: int, asked: int) -> None:
-        if finished != last[0] and finished % 5 == 0:
-            last[0] = finished
-            say(f"search: {finished} of {asked} trials")
+    def tell(done: int, asked: int) -> None:
+        if done != last[0] and done % 5 == 0:
+            last[0] = done
+            say(f"search: {done} of {asked} trials")
 
-    ran = run_worker(
-        storage, search_settings(spec), table.inputs, table.faults, width_of(spec["faults"]), worker, progress=tell
-    )
-    write_json(output, {"worker": worker, "trials": ran})
+    data = table.inputs, table.faults, width_of(spec["faults"])
+    settings = search_settings(spec)
+    ran = run_worker(storage, settings, *data, worker, progress=tell)
+    trials = [asdict(trial) for trial in finished(storage, settings, *data)]
+    write_json(output, {"worker": worker, "ran": ran, "trials": trials})
 
 
-def choose_network(features: str, spec: Mapping[str, Any], storage: str, trials: str, chosen: str) -> None:
+def choose_network(workers: Sequence[str], spec: Mapping[str, Any], trials: str, chosen: str) -> None:
     """List the finished trials and choose the smallest network among the good ones.
+
+    Parameters
+    ----------
+    workers : what ``search_network`` has written
+    trials, chosen : JSON files to write
 
     Raises
     ------
-    InputError : no finished trial
+    InputError : no finished trial, or workers that searched apart from each other
     """
-    table = read_features(features).identified()
-    found = summarise(storage, search_settings(spec), table.inputs, table.faults, width_of(spec["faults"]))
-    write_json(trials, [asdict(trial) for trial in found])
-    write_json(chosen, asdict(choose(found, spec["search"]["tolerance"])))
+    found: dict[int, Trial] = {}
+    for path in workers:
+        for trial in _trials(path):
+            if found.setdefault(trial.number, trial) != trial:
+                raise InputError(
+                    f"search.storage: the workers of this search share none ({path} has another trial "
+                    f"{trial.number}); accepted is the address of a database that all of them reach"
+                )
+    every = ranked(found.values(), spec["search"]["trials"])
+    write_json(trials, [asdict(trial) for trial in every])
+    write_json(chosen, asdict(choose(every, spec["search"]["tolerance"])))
+
+
+def _trials(path: str) -> list[Trial]:
+    """Trials that a worker of the search has written."""
+    try:
+        return [Trial(**entry) for entry in read_json(path, "trials")["trials"]]
+    except TypeError as error:
+        raise InputError(f"{path}: not what a worker of the search has written ({error})") from error
 
 
 def export_network(folder: str | Path, features: str, model: str, source: str, check: str) -> None:

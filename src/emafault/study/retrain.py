@@ -22,32 +22,38 @@ from ..io.recording import Recording
 from ..plain import read_json
 from ..progress import progress, say
 from ..reconstruction import Features, join_features, reconstruct
-from ..reporting.retrained import show_in_report
-from ..reporting.written import REPORT, VERDICT
+from ..reporting.retrained import write_with_section
 from .networks import width_of, write_json
 
 BLOCK = 25
 
 
-def retrain_network(bench: str | Path, folder: str | Path, spec: Mapping[str, Any], output: str | Path) -> None:
+def retrain_network(
+    bench: str | Path,
+    diagnosed: str | Path,
+    report: str | Path,
+    spec: Mapping[str, Any],
+    output: str | Path,
+    page: str | Path,
+) -> None:
     """Train both networks, compare their errors on the bench and show them in the diagnosis' report.
 
     Parameters
     ----------
     bench : the folder that was diagnosed
-    folder : where its verdict and report stand
+    diagnosed, report : its verdict and its report
     spec : the sub-tree ``config.retraining_spec``
     output : JSON file to write; root mean square errors in percent of each component's range, against the true fault
         vectors where the recordings hold them, else against the diagnosis' joint fit
+    page : the report with what retraining brought, to write
 
     Raises
     ------
     InputError : no verdict of the actuator's twin, or recordings that cannot be used
     """
-    folder = Path(folder)
-    verdict = read_json(folder / VERDICT)
+    verdict = read_json(diagnosed)
     if "simulator" not in verdict:
-        raise InputError(f"{folder / VERDICT}: no verdict on the actuator; its twin alone can be trained for")
+        raise InputError(f"{diagnosed}: no verdict on the actuator; its twin alone can be trained for")
     actuator = ActuatorParameters(**spec["dataset"]["actuator"])
     names = {n for part in verdict["recordings"].values() for n in part}
     recordings = {n: r for n, r in read_bench(bench, actuator).recordings.items() if n in names}
@@ -91,8 +97,8 @@ def retrain_network(bench: str | Path, folder: str | Path, spec: Mapping[str, An
             "estimates": {n: dict(zip(FAULT_NAMES, map(float, row))) for n, row in zip(measured, found)},
         }
     result = {"digest": verdict["digest"], "reference": reference, "recordings": list(measured), **errors}
+    write_with_section(report, result, page)
     write_json(output, result)
-    show_in_report(folder / REPORT, result)
     say(f"fault error without {errors['before']['rms']:.2f} %, with {errors['after']['rms']:.2f} % of range")
 
 

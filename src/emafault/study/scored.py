@@ -1,10 +1,13 @@
 """The scoreboard of a draw of blind cases, written and tracked."""
 
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError, shown
+from ..plain import read_json
 from ..provenance import digest_of, file_digest
 from ..tracking import Data, Entry, log_run
 from ..tracking.experiments import BLIND_CASES
@@ -35,8 +38,11 @@ def score_draw(
     ------
     InputError : a verdict that cannot be read, or a tracking server that cannot be used
     """
-    folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    found = score(folder, processes=processes) | {"measured": json.loads(measured.read_text()) if measured else []}
+    with tempfile.TemporaryDirectory() as name:
+        for batch in batches:
+            unpack(batch, Path(name))
+        found = score(name, processes=processes)
+    found |= {"measured": json.loads(measured.read_text()) if measured else []}
     page = write_scoreboard(found, report.parent)
     if page != report:
         page.replace(report)
@@ -44,7 +50,13 @@ def score_draw(
     values = {m["id"]: float(m["value"]) for m in found["metrics"] if m["value"] is not None}
     draw = report.parent.name
     cases = len(found["rows"])
-    data = Data(f"blind cases {draw}", digest_of(*map(file_digest, sorted(batches))), str(folder), "evaluation", cases)
+    data = Data(
+        f"blind cases {draw}",
+        digest_of(*map(file_digest, sorted(batches))),
+        str(batches[0].parent),
+        "evaluation",
+        cases,
+    )
     entry = Entry(
         f"withheld {draw}",
         {"draw": draw, "cases": cases},
@@ -55,6 +67,24 @@ def score_draw(
         files={str(report): "", str(scores): ""},
     )
     log_run(place["uri"], place["experiment"], entry, BLIND_CASES)
+
+
+def unpack(batch: Path, folder: Path) -> None:
+    """Write the keys and verdicts that a job has written as one file into a folder each.
+
+    Raises
+    ------
+    InputError : not such a file
+    """
+    files = read_json(batch, "files")["files"]
+    if not isinstance(files, dict) or not all(isinstance(text, str) for text in files.values()):
+        raise InputError(f"{batch}: not what a job of blind cases has written")
+    for name, text in files.items():
+        path = folder / name
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise InputError(f"{batch}: holds a file outside its folder, {shown(name)}")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
 
 
 def _as_columns(metrics: Sequence[Mapping[str, Any]]) -> dict[str, list]:
