@@ -60,13 +60,11 @@ def written(tmp_path):
     """The check of an actuator of one's own, from ten cases, as the workflow writes it."""
     composed = config.compose(overrides=f"actuator={EXAMPLES / 'hinge_28v.yaml'}")
     spec = config.calibration_spec(composed, f"actuator={EXAMPLES / 'hinge_28v.yaml'}")
+    files = {}
     for n in range(10):
         key, verdict = effect_free(n, 0.9, n > 0)
-        for path, what in ((f"keys/{n}.json", key), (f"diagnoses/{n}/diagnosis.json", verdict)):
-            file = tmp_path / "cases_x" / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(json.dumps(what))
-    (tmp_path / "T0_0.json").write_text(json.dumps({"folder": "cases_x"}))
+        files |= {f"keys/{n}.json": json.dumps(key), f"diagnoses/{n}/diagnosis.json": json.dumps(verdict)}
+    (tmp_path / "T0_0.json").write_text(json.dumps({"files": files}))
     (tmp_path / "pace.json").write_text(json.dumps({"seconds": {"T0": 8.0}}))
     page, output = tmp_path / "calibration.html", tmp_path / "calibration.json"
     finish([tmp_path / "T0_0.json"], tmp_path / "pace.json", page, output, spec)

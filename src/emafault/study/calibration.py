@@ -19,8 +19,9 @@ from ..reporting.page import Page
 from ..withheld.metrics import METRICS, Rows, calibration_error, reliability
 from ..withheld.population import population_of
 from ..withheld.scoreboard import reliability_figure
-from ..withheld.scoring import score, score_rows
+from ..withheld.scoring import score_rows
 from .blind import folder_of, run_cases
+from .scored import scored
 
 KNOWN = next(m for m in METRICS if m.id == "ece_known").select
 DRAWS = 2000  # of what probabilities that hold would show
@@ -69,8 +70,7 @@ def finish(batches: Sequence[Path], pace: Path, page: Path, output: Path, spec: 
     ------
     InputError : a verdict that cannot be read
     """
-    folder = batches[0].parent / json.loads(batches[0].read_text())["folder"]
-    rows = score(folder)["rows"]
+    rows = scored(batches)["rows"]
     out = {
         "format": FORMAT, "version": __version__,
         "actuator": {"name": spec["name"], "parameters": spec["actuator"]},

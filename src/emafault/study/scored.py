@@ -38,10 +38,7 @@ def score_draw(
     ------
     InputError : a verdict that cannot be read, or a tracking server that cannot be used
     """
-    with tempfile.TemporaryDirectory() as name:
-        for batch in batches:
-            unpack(batch, Path(name))
-        found = score(name, processes=processes)
+    found = scored(batches, processes)
     found |= {"measured": json.loads(measured.read_text()) if measured else []}
     page = write_scoreboard(found, report.parent)
     if page != report:
@@ -67,6 +64,19 @@ def score_draw(
         files={str(report): "", str(scores): ""},
     )
     log_run(place["uri"], place["experiment"], entry, BLIND_CASES)
+
+
+def scored(batches: Sequence[Path], processes: int = 1) -> dict[str, Any]:
+    """Judged rows and metrics of what the jobs of a draw have written.
+
+    Raises
+    ------
+    InputError : not such files, or a verdict that cannot be read
+    """
+    with tempfile.TemporaryDirectory() as name:
+        for batch in batches:
+            unpack(batch, Path(name))
+        return score(name, processes=processes)
 
 
 def unpack(batch: Path, folder: Path) -> None:
