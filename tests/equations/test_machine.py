@@ -1,5 +1,7 @@
 """The reference actuator as the diagnosis sees it: its priors, and that a fit stands still at its optimum."""
 
+import numpy as np
+
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.effects import EFFECTS
 
@@ -39,3 +41,19 @@ def test_a_fit_stands_still_at_its_optimum():
         steps.append(max(abs(deviations[n]) / bench.prior(n)[1] for n in turns))
         bench.move(found, normal)
     assert max(steps[2:]) < 1e-5, steps
+
+
+def test_an_edge_at_the_end_of_an_interval_is_no_corner(nominal):
+    """Where a current passes from one interval into the next, the residual's derivative is that of differences."""
+    edge = "controller.edge_a@a.nc"
+    off = {n: p.off for n, p in nominal.parameters.items()}
+
+    def at(x):
+        blocks = nominal.blocks({**off, edge: x}, "a.nc", wanted={edge})
+        return next(b for b in blocks if b.equation == "commutation")
+
+    step = 1e-5
+    for x in np.linspace(-0.02, 0.02, 9):
+        slope = np.broadcast_to(at(x).columns[edge], len(at(x).residual))
+        difference = (at(x + step).residual - at(x - step).residual) / (2.0 * step)
+        assert np.max(np.abs(slope - difference)) < 0.02 * np.max(np.abs(slope))

@@ -25,7 +25,6 @@ SINGLES = 3  # listed effects that a search may begin at in the place of what le
 CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
-STILL = 0.3  # prior standard deviations by which the point may still move
 FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
 
@@ -69,6 +68,7 @@ class Bench(NormalEquations):
         super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
         self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
         self._inserted: dict[tuple, Inserted] = {}
+        self.looked_at: tuple[str, ...] | None = None  # units of the set at which the weights were taken
 
     def fit(self, begun: "tuple[Bench, Fit] | None" = None) -> Fit:
         """Search and relinearise until the leading set stands still.
@@ -105,6 +105,7 @@ class Bench(NormalEquations):
         self._keep_likely(search)
         self._describe("led")
         if self._carry_own_forms(search) or self.described != before:
+            self.looked_at = search.ranked()[0].units
             whites, normal = self._renewed()
         return self._with_none_to_leave(whites, normal)
 
@@ -245,18 +246,17 @@ class Bench(NormalEquations):
         self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
     ) -> tuple[list[White], Normal, Search]:
         search = self._search(normal, remainders)
-        renewed: tuple[str, ...] = ()
         for _ in range(rounds):
             best = search.ranked()[0]
             more = remainders and self._carry_own_forms(search)
-            if self._step(best, normal) < STILL and not more:
+            if self._ahead(best, normal) < self.settled and not more:
                 break
             self.settle(best, normal)
             if self._refine(best):
                 self.settle(best)
             # weights are those of the first look at a set: no hypothesis gains by what it leaves
-            whites = self.linearise(renew=more or best.units != renewed)
-            renewed = best.units
+            whites = self.linearise(renew=more or best.units != self.looked_at)
+            self.looked_at = best.units
             normal = self.normal(whites)
             search = self._search(normal, remainders)
         return whites, normal, search
@@ -301,12 +301,12 @@ class Bench(NormalEquations):
         return bool(self.sizes)
 
     # ---- sets, each at its own optimum
-    def _step(self, model: Model, normal: Normal) -> float:
-        """Largest step that a model would move the point by, which stays."""
+    def _ahead(self, model: Model, normal: Normal) -> float:
+        """Log evidence that a model's step from the point promises, which stays."""
         kept = dict(self.point), set(self.on)
-        step = self.move(model, normal)[0]
+        ahead = self.move(model, normal)[1]
         self.point, self.on = kept
-        return step
+        return ahead
 
     def settle(self, model: Model, normal: Normal | None = None, steps: int = SETTLING) -> Model:
         """A set at its own optimum, by Gauss-Newton from the present point, which moves there.

@@ -6,6 +6,7 @@ controller's own: a constant and a part in proportion to the current.
 """
 
 import numpy as np
+from scipy.special import ndtr
 
 from .dual import Dual, Number
 from .point import State, effect_name
@@ -16,6 +17,7 @@ EDGE = np.pi / 6.0
 REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors may move it by
 PASSING = 0.3  # of the time in which a current passes over, by which it scatters on effect-free benches
 LONGEST = 0.35  # of an interval, that a current may take to pass over
+WIDEST = 0.25  # variance that a share of an interval has at most
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 
@@ -47,10 +49,10 @@ def residual(state: State) -> Dual:
     for j in range(3):
         rows, low, high, edge = _edges(state, j)
         stays, own = (np.asarray(state.current[q].value)[rows] for q in (STAYS[j], j))
-        inside = (edge.value > low) & (edge.value < high)
-        share = (high - edge) * (1.0 / (high - low))
-        share = share.kept(inside) + np.where(edge.value <= low, 1.0, 0.0)
-        out.append(own + share * stays)
+        _, reach, width = _spread(state, j, low, high)
+        above, below = (high - edge.value) / reach, (low - edge.value) / reach
+        share = reach * (_above_zero(above) - _above_zero(below)) / width
+        out.append(own + edge.through(share, (ndtr(below) - ndtr(above)) / width) * stays)
     names = {n for d in out for n in d.slopes}
     sizes = [len(np.atleast_1d(d.value)) for d in out]
     slopes: dict[str, Number] = {
@@ -77,18 +79,36 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     return rows, low, high, edge
 
 
+def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(row,) by how long a passing over scatters (s), how far an edge and its interval's ends are uncertain and the
+    interval's width (electrical rad)."""
+    rec, a = state.rec, state.rec.actuator
+    rows = rows_of(state, j)
+    scatter = a.inductance / a.bus_voltage * (a.hysteresis + PASSING * np.abs(rec.current[rows, STAYS[j]]))
+    ends = a.pole_pairs * rec.noise.angle
+    reach = np.hypot(a.pole_pairs * np.abs(rec.speed[rows]) * scatter, ends)
+    return scatter, reach, np.maximum(high - low, ends)
+
+
+def _above_zero(z: np.ndarray) -> np.ndarray:
+    """Mean of what a standard normal deviate about ``z`` has above zero."""
+    return z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
+
+
 def noise_bands(state: State) -> list[np.ndarray]:
-    """Diagonal of the noise's covariance (A2): the sensors', when within the ripple a current passes over, and where a
-    current that changes does so within an interval."""
+    """Diagonal of the noise's covariance (A2): the sensors', when within the ripple a current passes over and by what
+    the ends of its interval are off, and where a current that changes does so within an interval."""
     rec, a = state.rec, state.rec.actuator
     change = rec.rows_from.current_change
     out = []
     for j in range(3):
         rows, low, high, edge = _edges(state, j)
         stays = np.abs(rec.current[rows, STAYS[j]])
-        scatter = a.inductance / a.bus_voltage * (a.hysteresis + PASSING * stays)  # s
-        reach = a.pole_pairs * np.abs(rec.speed[rows]) * scatter
-        inside = (edge.value > low - reach) & (edge.value < high + reach)
-        passing = inside * (scatter / rec.interval * stays) ** 2
+        scatter, reach, width = _spread(state, j, low, high)
+        inside = ndtr((high - edge.value) / reach) - ndtr((low - edge.value) / reach)
+        share = np.clip((high - edge.value) / width, 0.0, 1.0)
+        ends = a.pole_pairs * rec.noise.angle / width
+        off = (scatter / rec.interval) ** 2 + (share**2 + (1.0 - share) ** 2) * ends**2
+        passing = inside * np.minimum(off, WIDEST) * stays**2
         out.append(2.0 * rec.noise.current**2 + passing + (UNRESOLVED * change[rows]) ** 2)
     return [np.concatenate(out)]
