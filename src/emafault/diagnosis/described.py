@@ -1,11 +1,11 @@
 """Described forms as candidate causes: proposed by scans of what is left, then columns like every other unit's."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import Definite
+from .evidence import Definite, Reduced
 from .forms import FORMS
 from .left import Left, beside_first, gain
 from .linear import FEW
@@ -324,24 +324,36 @@ def curve(
     }  # fmt: skip
 
 
-def another_form_of(search: Search, unit: str, deviations: Mapping[str, float]) -> str | None:
+def another_form_of(
+    reduced: Callable[[tuple[str, ...]], Reduced], search: Search, unit: str, deviations: Mapping[str, float]
+) -> str | None:
     """Listed effect whose signal is nearly that of a form, the nuisances taken out of both; None where there is none.
 
-    ``deviations``: the form's coefficients. The cosine is that between what the form adds and the nearest that the
-    effect can.
+    The tolerance of a quantity that the effect is another value of is not: it would take the effect out with it.
+
+    Parameters
+    ----------
+    reduced : the linear model with the nuisances marginalised but for those named
+    deviations : the form's coefficients
+
+    Notes
+    -----
+    The cosine is that between what the form adds and the nearest that the effect can.
     """
-    M, index = search.reduced.M, search.reduced.index
-    own = [n for n in search.candidates[unit, 0].names if n in deviations]
-    k, c = np.array([index[n] for n in own], int), np.array([deviations[n] for n in own])
-    power = float(c @ M[np.ix_(k, k)] @ c)
     best, nearest = ALIKE**2, None
+    own = [n for n in search.candidates[unit, 0].names if n in deviations]
+    c = np.array([deviations[n] for n in own])
     for (other, variant), candidate in search.candidates.items():
-        if search.units[other].kind not in LISTED or variant >= OTHER_FORM or power <= 0.0:
+        if search.units[other].kind not in LISTED or variant >= OTHER_FORM:
             continue
-        j = candidate.index
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(M)[j], 1e-300))
-        score = scale * (M[np.ix_(j, k)] @ c)
-        own_power = M[np.ix_(j, j)] * np.outer(scale, scale) + 1e-9 * np.eye(len(j))
+        r = reduced(tuple(p.alias for p in search.units[other].parameters if p.alias))
+        k, j = (np.array([r.index[n] for n in names], int) for names in (own, candidate.names))
+        power = float(c @ r.M[np.ix_(k, k)] @ c)
+        if power <= 0.0:
+            continue
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(r.M)[j], 1e-300))
+        score = scale * (r.M[np.ix_(j, k)] @ c)
+        own_power = r.M[np.ix_(j, j)] * np.outer(scale, scale) + 1e-9 * np.eye(len(j))
         share = float(score @ Definite(own_power).solve(score)) / power
         if share > best:
             best, nearest = share, other

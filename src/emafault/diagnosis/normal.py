@@ -1,6 +1,6 @@
 """Normal equations of a bench at its point: linearised, assembled, and the step that a set would take."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -145,13 +145,12 @@ class NormalEquations(Point):
         left = list(dict.fromkeys(n for w in whites for n in w.names if not is_parameter(n)))
         return assemble(whites, [*self.nuisances, *columns, *left], aliases)
 
-    def reduce(self, normal: Normal) -> Reduced:
-        """The nuisances marginalised."""
+    def reduce(self, normal: Normal, but: Collection[str] = ()) -> Reduced:
+        """The nuisances marginalised, ``but`` for some."""
         prior = {n: self.prior(n) for n in normal.names}
-        mean = np.array([prior[n][0] for n in self.nuisances])
-        sd = np.array([prior[n][1] for n in self.nuisances])
-        fixed = np.array([prior[n][2] for n in normal.names])
-        return marginalise(normal, self.nuisances, mean, sd, fixed)
+        free = [n for n in self.nuisances if n not in but]
+        mean, sd = (np.array([prior[n][k] for n in free]) for k in (0, 1))
+        return marginalise(normal, free, mean, sd, np.array([prior[n][2] for n in normal.names]))
 
     def nuisance_deviations(self, normal: Normal, given: dict[str, float]) -> dict[str, float]:
         """Deviations of the nuisances where other columns take those given, the rest off."""

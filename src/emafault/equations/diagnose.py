@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..actuator.sensors import SensorNoise
 from ..diagnosis import wandering
 from ..diagnosis.closure import Ladder
 from ..diagnosis.described import another_form_of, curve
-from ..diagnosis.evidence import Definite, Normal
+from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
@@ -183,7 +184,7 @@ def _diagnosed(
     listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
     verdict["inclusion"] = {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())}
     changes = held_out.changes if held_out else {}
-    verdict["discovered"] = [*told(quality), *_discovered(bench, machine, reading, best, fit.search, changes)]
+    verdict["discovered"] = [*told(quality), *_discovered(bench, machine, reading, best, fit, changes)]
     verdict["quality"] = at_a_glance(quality)
     verdict["groups"] = [list(g) for g in reading.groups]
     before_point = null(bench).values()
@@ -312,7 +313,7 @@ def _discovered(
     machine: ReferenceActuator,
     reading: Reading,
     model: Model,
-    search: Search,
+    fit: Fit,
     changes: Mapping[str, float],
 ) -> list[dict]:
     """Forms that no catalogue lists, and remainders, as the verdict tells them.
@@ -320,6 +321,11 @@ def _discovered(
     ``changes``: by effect, log odds that it has another size in each recording.
     """
     out = []
+
+    @cache
+    def partly(but: tuple[str, ...]) -> Reduced:
+        return bench.reduce(fit.normal, but) if but else fit.search.reduced
+
     described = {d.id: d for d in bench.described}
     for form in reading.forms:
         unit = next(u for u in bench.units if u.id == form)
@@ -342,7 +348,7 @@ def _discovered(
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,
-                "another_form_of": another_form_of(search, form, model.deviations),
+                "another_form_of": another_form_of(partly, fit.search, form, model.deviations),
                 "recordings": list(bench.recordings), **entry,
             }
         )  # fmt: skip
@@ -354,7 +360,7 @@ def _discovered(
                 "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
                 "parameters": {},
                 "recordings": list(bench.recordings),
-                "sentence": remainder_sentence(search, equation, changes),
+                "sentence": remainder_sentence(fit.search, equation, changes),
             }
         )  # fmt: skip
     return out
