@@ -152,19 +152,35 @@ class NormalEquations(Point):
         mean, sd = (np.array([prior[n][k] for n in free]) for k in (0, 1))
         return marginalise(normal, free, mean, sd, np.array([prior[n][2] for n in normal.names]))
 
-    def nuisance_deviations(self, normal: Normal, given: dict[str, float]) -> dict[str, float]:
-        """Deviations of the nuisances where other columns take those given, the rest off."""
-        index = normal.index
-        n = np.array([index[x] for x in self.nuisances])
-        rest = [x for x in normal.names if x not in set(self.nuisances)]
-        d = np.array([given.get(x, self.prior(x)[2]) for x in rest])
+    def nuisance_deviations(
+        self, normal: Normal, given: Mapping[str, float], held: Mapping[str, float] | None = None
+    ) -> dict[str, float]:
+        """Deviations of the nuisances, but for those that are ``held``, where other columns take those given, the rest
+        off."""
+        index, held = normal.index, held or {}
+        free = [x for x in self.nuisances if x not in held]
+        n = np.array([index[x] for x in free], int)
+        rest = [x for x in normal.names if x not in set(free)]
+        d = np.array([held[x] if x in held else given.get(x, self.prior(x)[2]) for x in rest])
         r = np.array([index[x] for x in rest], int)
-        mean = np.array([self.prior(x)[0] for x in self.nuisances])
-        sd = np.array([self.prior(x)[1] for x in self.nuisances])
+        mean = np.array([self.prior(x)[0] for x in free])
+        sd = np.array([self.prior(x)[1] for x in free])
         A = normal.H[np.ix_(n, n)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
         found = Definite(A).solve(right)
-        return dict(zip(self.nuisances, found.tolist(), strict=True))
+        return dict(zip(free, found.tolist(), strict=True))
+
+    def _nuisances_within_reach(self, normal: Normal, given: Mapping[str, float]) -> dict[str, float]:
+        """The same, those that would leave where their prior has any mass held at its end and the others fitted beside
+        them (an active set; Nocedal and Wright 2006, Numerical Optimization, section 16.5)."""
+        held: dict[str, float] = {}
+        while True:
+            found = self.nuisance_deviations(normal, given, held)
+            within = {n: self._within_reach(n, d) for n, d in found.items()}
+            over = {n: within[n] for n, d in found.items() if within[n] != d}
+            if not over:
+                return found | held
+            held |= over
 
     # ---- candidates
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
@@ -241,7 +257,7 @@ class NormalEquations(Point):
         Boyd and Vandenberghe 2004, Convex Optimization, section 9.5.1)
         """
         given = {n: d for n, d in model.deviations.items()}
-        nuisance = self.nuisance_deviations(normal, given)
+        nuisance = self._nuisances_within_reach(normal, given)
         largest = max((abs(d) / self.prior(n)[1] for n, d in nuisance.items()), default=0.0)
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()

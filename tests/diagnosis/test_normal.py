@@ -1,0 +1,32 @@
+"""Steps of the point within the reach of the priors."""
+
+import numpy as np
+
+from emafault.diagnosis.fit import NOTHING, Bench
+from emafault.diagnosis.model import Block, Parameter
+
+ROWS = 4000
+
+
+class Machine:
+    """Two coefficients of nearly the same column, the first far beyond where its prior has any mass."""
+
+    forms = units = ()
+    parameters = {n: Parameter(n, 0.0, 0.0, 1.0) for n in ("a", "b")}  # noqa: RUF012
+
+    def blocks(self, values, recording, wanted=None, disturbed=False):
+        rng = np.random.default_rng(0)
+        noise, one, other = rng.standard_normal((3, ROWS))
+        columns = {"a": one, "b": one + 0.1 * other}
+        residual = noise + sum((values[n] - true) * columns[n] for n, true in (("a", 5.0), ("b", -1.0)))
+        return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+
+def test_what_is_held_at_the_end_of_its_prior_is_held_while_the_others_are_fitted():
+    """Cut off after a joint fit, the second would stay where it makes up for a first that is not there."""
+    bench = Bench(Machine(), ["r"])
+    bench.move(NOTHING, bench.normal(bench.linearise(NOTHING, corrected=False), NOTHING))
+    normal = bench.normal(bench.linearise(NOTHING, corrected=False), NOTHING)
+    assert bench.point["a"] == bench.reach
+    b = normal.index["b"]
+    assert abs(bench.point["b"] + normal.g[b]) < 1e-6 * normal.H[b, b]
