@@ -9,7 +9,7 @@ from emafault import config as configuration
 from emafault import provenance
 from emafault.errors import InputError, one_line
 from emafault.places import refuse_folder
-from emafault.reporting import times
+from emafault.reporting import failures, times
 
 RESULTS = "results"
 # where results are in the end; with a storage provider they are in the working folder only while they are used
@@ -75,6 +75,8 @@ onsuccess:
 
 onerror:
     times.write(f"{KEPT}/benchmarks")
+    for line in failures.lines(workflow.scheduler.failed, failures.logged(log)):
+        print(line, file=sys.stderr, flush=True)
 
 
 # --- datasets and features ---
