@@ -1,6 +1,6 @@
 """The workflow on a Slurm of two nodes on this machine: the same bits as here, and what becomes of jobs that fail.
 
-    python benchmarks/cluster.py [--log FILE] [results scancel drain time memory line]
+    python benchmarks/cluster.py [--log FILE] [results scancel drain down time memory refused]
 
 Needs root, ``apt-get install slurm-wlm munge`` and ``pip install ".[slurm]"``. The nodes have two cores each and no
 accounting. Prints a line for each thing that was tried; exit code 1 where one does not hold.
@@ -21,15 +21,24 @@ from kills import of_the_study, plain
 from slurm import cluster
 
 PROFILE = ("--profile", "profiles/slurm", "--slurm-no-account", "--slurm-status-command", "squeue")
+# some 100 s of training
+SLOW = (
+    "overrides=search=none sampling.runs=60 evaluation.seeds=13 training=adam training.epochs=300 training.max_fail=300"
+)
 SHARD = "results/datasets/smoke/{}/shard_0.nc"
 LOG = Path(os.devnull)
+STARTED: list[subprocess.Popen] = []
 
 
 def run(house: Path, nodes: dict[str, str], *arguments: str) -> subprocess.Popen:
     """The workflow on the cluster, what it says kept in a file beside the results."""
     command = [sys.executable, "-m", "snakemake", *PROFILE, *arguments]
     said = open(house / "said.log", "w")
-    return subprocess.Popen(command, cwd=house, env=environment(house, **nodes), stdout=said, stderr=subprocess.STDOUT)
+    started = subprocess.Popen(
+        command, cwd=house, env=environment(house, **nodes), stdout=said, stderr=subprocess.STDOUT
+    )
+    STARTED.append(started)
+    return started
 
 
 def ended(house: Path, process: subprocess.Popen, within: float = 900.0) -> tuple[int, str]:
@@ -46,14 +55,14 @@ def slurm(nodes: dict[str, str], *command: str) -> str:
     return subprocess.run(command, env={**os.environ, **nodes}, capture_output=True, text=True).stdout
 
 
-def running_job(nodes: dict[str, str], within: float = 240.0) -> tuple[str, str]:
-    """Number and node of a job that runs."""
+def running_job(nodes: dict[str, str], rule: str, but: str = "", within: float = 240.0) -> tuple[str, str]:
+    """Number and node of a job of a rule that runs, other than one that is over."""
     deadline = time.monotonic() + within
     while time.monotonic() < deadline:
-        lines = slurm(nodes, "squeue", "-h", "-t", "R", "-o", "%i %N").split("\n")
-        if lines[0]:
-            number, node = lines[0].split()
-            return number, node
+        for line in slurm(nodes, "squeue", "-h", "-t", "R", "-o", "%i %N %k").splitlines():
+            number, node, comment = line.split(maxsplit=2)
+            if comment.startswith(f"rule_{rule}") and number != but:
+                return number, node
         time.sleep(0.1)
     raise SystemExit("no job begins to run")
 
@@ -82,57 +91,89 @@ def try_results(house: Path, nodes: dict[str, str]) -> str:
 
 
 def try_scancel(house: Path, nodes: dict[str, str]) -> str:
-    """A job that is cancelled is done again."""
-    process = run(house, nodes, SHARD.format("training"), *SMALL, "--forcerun", "simulate_shard")
-    number, _ = running_job(nodes)
-    slurm(nodes, "scancel", number)
+    """A job that is cancelled is done again; where that is cancelled too, a line says so."""
+    target = (SHARD.format("training"), *SMALL, "--forcerun", "simulate_shard")
+    process = run(house, nodes, *target)
+    slurm(nodes, "scancel", running_job(nodes, "simulate_shard")[0])
     code, said = ended(house, process)
     assert code == 0 and "Trying to restart" in said, said[-3000:]
-    return "done again by itself"
+    process = run(house, nodes, *target)
+    first, _ = running_job(nodes, "simulate_shard")
+    slurm(nodes, "scancel", first)
+    slurm(nodes, "scancel", running_job(nodes, "simulate_shard", first)[0])
+    line = _only_line(*ended(house, process))
+    assert line.startswith("emafault: simulate_shard: cancelled, after 2 attempts"), line
+    return f"done again by itself; cancelled twice\n  {line}"
 
 
 def try_drain(house: Path, nodes: dict[str, str]) -> str:
-    """A node that goes down takes a job with it, which is done on the other."""
+    """A job that is taken from a node to be drained is done on the other."""
+    return _moved(house, nodes, "DRAIN", "requeue")
+
+
+def try_down(house: Path, nodes: dict[str, str]) -> str:
+    """A node that fails takes a job with it, which is done again, there if it is back by then."""
+    return _moved(house, nodes, "DOWN")
+
+
+def _moved(house: Path, nodes: dict[str, str], state: str, *job: str) -> str:
     process = run(house, nodes, SHARD.format("fresh"), *SMALL, "--forcerun", "simulate_shard")
-    number, node = running_job(nodes)
-    slurm(nodes, "scontrol", "update", f"NodeName={node}", "State=DRAIN", "Reason=trial")
-    slurm(nodes, "scontrol", "requeue", number)
+    number, node = running_job(nodes, "simulate_shard")
+    slurm(nodes, "scontrol", "update", f"NodeName={node}", f"State={state}", "Reason=trial")
+    if job:
+        slurm(nodes, "scontrol", *job, number)
     code, said = ended(house, process)
-    after = slurm(nodes, "squeue", "-h", "-t", "all", "-j", number, "-o", "%N").strip()
+    told = slurm(nodes, "scontrol", "show", "job", number)
     slurm(nodes, "scontrol", "update", f"NodeName={node}", "State=RESUME")
-    assert code == 0 and after != node, (node, after, said[-3000:])
-    return f"{node} drained, its job done on {after}"
+    after = re.findall(r"\bNodeList=(\S+)", told)
+    assert code == 0 and "Restarts=1" in told and after, (told, said[-3000:])
+    assert after[0] != node or state == "DOWN", f"done on {node}, which was drained"
+    return f"{node} in state {state}, its job begun again by Slurm on {after[0]}"
 
 
 def try_time(house: Path, nodes: dict[str, str]) -> str:
-    """A job that takes longer than its limit gets more at the next attempt."""
-    more = ("--set-resources", "simulate_shard:runtime=1 if attempt == 1 else 30")
-    target = "results/datasets/long/training/shard_0.nc"
-    slow = "overrides=search.workers=1 sampling.runs=100000 sampling.fresh=10 sampling.shards=1 name=long dataset=long"
-    process = run(house, nodes, target, "--config", "experiment=smoke", slow, *more)
-    code, said = ended(house, process, 1800.0)
-    assert "TIMEOUT" in said and code == 0, said[-3000:]
-    return "past its limit of 1 min, done with 30"
+    """A job that takes longer than its limit gets more; where that is too little again, a line says so."""
+    slow = (*SMALL[:2], SLOW)
+    target = "results/experiments/smoke/identifiers/weighted_floating/network"
+    return _short_of("time limit", "train_identifier:runtime", (1, 30), "min", house, nodes, target, *slow)
 
 
 def try_memory(house: Path, nodes: dict[str, str]) -> str:
-    """A job that takes more memory than it asked for gets more at the next attempt."""
-    more = ("--set-resources", "simulate_shard:mem_mb=60 if attempt == 1 else 1000")
-    process = run(house, nodes, SHARD.format("training"), *SMALL, *more, "--forcerun", "simulate_shard")
-    code, said = ended(house, process)
-    assert code == 0 and "Trying to restart" in said, said[-3000:]
-    return "more than its 60 MB, done with 1000"
+    """A job that takes more memory than it asked for gets more; where that is too little again, a line says so."""
+    shard = SHARD.format("training")
+    again = ("--forcerun", "simulate_shard")
+    return _short_of("out of memory", "simulate_shard:mem_mb", (60, 1000), "MB", house, nodes, shard, *SMALL, *again)
 
 
-def try_line(house: Path, nodes: dict[str, str]) -> str:
-    """A job that fails at every attempt ends in one line, and nothing made is lost."""
-    before = results(house)
-    more = ("--set-resources", "simulate_shard:mem_mb=60")
-    process = run(house, nodes, SHARD.format("training"), *SMALL, *more, "--forcerun", "simulate_shard")
-    code, said = ended(house, process)
+def _short_of(
+    reason: str, resource: str, limits: tuple[int, int], unit: str, house: Path, nodes: dict[str, str], *target: str
+) -> str:
+    rule, (few, enough) = resource.split(":")[0], limits
+    code, said = ended(house, run(house, nodes, *target, "--set-resources", f"{resource}={few}"))
+    line = _only_line(code, said)
+    assert line.startswith(f"emafault: {rule}: {reason} at {few} {unit}, after 2 attempts"), line
+    more = f"{resource}={few} if attempt == 1 else {enough}"
+    code, said = ended(house, run(house, nodes, *target, "--set-resources", more))
+    assert code == 0 and said.count("Trying to restart") == 1 and "emafault: " not in said, said[-3000:]
+    # what was not set here has doubled by the rule's own count of attempts; a failed job's log repeats what it had
+    other = "mem_mb" if unit == "min" else "runtime"
+    asked = re.findall(rf"^rule {rule}:$.*?{other}=(\d+)", said, re.M | re.S)
+    assert asked and int(asked[-1]) == 2 * int(asked[0]), asked
+    return f"done with {enough} {unit} after {few}; with {few} twice\n  {line}"
+
+
+def try_refused(house: Path, nodes: dict[str, str]) -> str:
+    """A job that needs more than any node has is refused, which a line says."""
+    more = ("--set-resources", "simulate_shard:mem_mb=60 if attempt == 1 else 100000", "--forcerun", "simulate_shard")
+    code, said = ended(house, run(house, nodes, SHARD.format("training"), *SMALL, *more))
+    line = _only_line(code, said)
+    assert line.startswith("emafault: simulate_shard: refused by Slurm"), line
+    return line
+
+
+def _only_line(code: int, said: str) -> str:
     lines = [line for line in said.splitlines() if line.startswith("emafault: ")]
     assert code != 0 and len(lines) == 1, said[-3000:]
-    assert all(n in results(house) for n in before if "shard_0" not in n)
     return lines[0]
 
 
@@ -146,12 +187,16 @@ def main() -> None:
     LOG, failed = args.log, 0
     with tempfile.TemporaryDirectory() as name, cluster() as nodes:
         house = build(Path(name) / "house")
-        for word in args.tries:
-            try:
-                print(f"{word}: {every[word](house, nodes)}", flush=True)
-            except AssertionError as error:
-                failed += 1
-                print(f"{word}: FAILED {error}", flush=True)
+        try:
+            for word in args.tries:
+                try:
+                    print(f"{word}: {every[word](house, nodes)}", flush=True)
+                except AssertionError as error:
+                    failed += 1
+                    print(f"{word}: FAILED {error}", flush=True)
+        finally:
+            for process in STARTED:
+                process.kill()
     sys.exit(min(failed, 1))
 
 

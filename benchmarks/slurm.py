@@ -1,7 +1,8 @@
 """A Slurm of two nodes on this machine, gone with the block: slurmctld, two slurmd and munged of Debian's packages.
 
 Needs root and ``apt-get install slurm-wlm munge``. Memory is watched and limited by Slurm's own gathering, since
-control groups may not be at hand; there is no accounting, so that jobs are asked for with squeue.
+control groups may not be at hand; there is no accounting, so that jobs are asked for with squeue. A requeued job waits
+until the credential of its last run has expired: ten seconds here, two minutes by default.
 """
 
 import contextlib
@@ -21,7 +22,7 @@ ClusterName=emafault
 SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={port}
 AuthType=auth/munge
-AuthInfo=socket={folder}/munge.socket
+AuthInfo=socket={folder}/munge.socket,cred_expire=10
 SlurmUser=root
 SlurmdUser=root
 StateSaveLocation={folder}/state
