@@ -19,7 +19,7 @@ from .terms import TERMS
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
-EDGE_SCATTER = 5e-4  # electrical rad, by which the model of how current passes over is wrong in a recording
+EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 CURVATURE = 10.0  # times a smooth current's, by which a current at an interval's end is off its neighbours' mean
