@@ -304,7 +304,7 @@ class Bench(NormalEquations):
     def _ahead(self, model: Model, normal: Normal) -> float:
         """Log evidence that a model's step from the point promises, which stays."""
         kept = dict(self.point), set(self.on)
-        ahead = self.move(model, normal)[1]
+        ahead = self.move(model, normal)
         self.point, self.on = kept
         return ahead
 
@@ -316,7 +316,7 @@ class Bench(NormalEquations):
         ahead = np.inf  # log evidence that the last step promised
         if normal is not None:
             begun = dict(self.point), set(self.on)
-            ahead = self.move(model, normal)[1]
+            ahead = self.move(model, normal)
             if ahead < self.settled:
                 return model
             new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun[1]}
@@ -327,10 +327,10 @@ class Bench(NormalEquations):
                 break
             # on its way a set may be led by a little bias, where it ends it must not
             found, at_point = self._fitted(model, corrected=False)
-            ahead = self.move(found, at_point)[1]
+            ahead = self.move(found, at_point)
         for _ in range(steps):
             found, at_point = self._fitted(model)
-            if self.move(found, at_point)[1] < self.settled:
+            if self.move(found, at_point) < self.settled:
                 break
         return found
 

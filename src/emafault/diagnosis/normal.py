@@ -248,17 +248,16 @@ class NormalEquations(Point):
         return self.parameters[p.alias].sd / p.sd if p.alias is not None else 0.0
 
     # ---- a step
-    def move(self, model: Model, normal: Normal) -> tuple[float, float]:
+    def move(self, model: Model, normal: Normal) -> float:
         """Move the point to a model's fit.
 
         Returns
         -------
-        largest step in prior standard deviations, and the log evidence that the step promises (Newton decrement;
-        Boyd and Vandenberghe 2004, Convex Optimization, section 9.5.1)
+        log evidence that the step promises (Newton decrement; Boyd and Vandenberghe 2004, Convex Optimization, section
+        9.5.1)
         """
         given = {n: d for n, d in model.deviations.items()}
         nuisance = self._nuisances_within_reach(normal, given)
-        largest = max((abs(d) / self.prior(n)[1] for n, d in nuisance.items()), default=0.0)
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()
         moved = dict(nuisance)
@@ -270,9 +269,7 @@ class NormalEquations(Point):
                 d = given.get(p.name, 0.0)
                 if p.secant is not None:
                     switched.append((unit, p, d))
-                    largest = 1.0
                 else:
-                    largest = max(largest, abs(d) / p.sd)
                     if unit.on is not None and unit.id in self.on and len(unit.variants) > 1:
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
@@ -287,7 +284,7 @@ class NormalEquations(Point):
         for unit, p, d in switched:
             self._switch_on(unit, p, d)
         self.on = on
-        return largest, decrement
+        return decrement
 
     def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
         names = [n for n in moved if n in normal.index]

@@ -95,10 +95,10 @@ class MeasuredBench(Bench):
 
     def move(self, model, normal):
         """See ``Bench``; the point stays where parameters are possible."""
-        steps = super().move(model, normal)
+        ahead = super().move(model, normal)
         for n, (low, high) in self.machine.bounds.items():
             self.point[n] = float(np.clip(self.point[n], low, high))
-        return steps
+        return ahead
 
     def _carry_own_forms(self, search: Search) -> bool:
         """See ``Bench``: effects of good sets alone."""
