@@ -7,6 +7,7 @@ from emafault.diagnosis.described import another_form_of
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Choice, Model, Search
+from emafault.diagnosis.whitening import Weights
 
 ROWS = 2000
 SPEED = np.linspace(0.1, 1.0, ROWS)
@@ -51,3 +52,48 @@ def test_a_form_is_much_like_the_effect_that_it_resembles(form, nearest):
     reduced = bench.reduce(normal)
     search = Search(reduced, *bench.candidates(reduced))
     assert another_form_of(lambda but: bench.reduce(normal, but), search, "~power", {"form.c": 0.5}) == nearest
+
+
+class Wave(Machine):
+    """A load that comes and goes, larger than the noise, and as much of another one that no effect is like."""
+
+    recordings = ("a", "b", "c")
+    time = np.arange(ROWS) * 1e-3
+
+    def __init__(self, sizes):
+        super().__init__(SPEED)
+        self.sizes = sizes
+
+    def samples(self, recording):
+        return ROWS
+
+    def channels(self, equation, driver):
+        return ()
+
+    def coefficients(self, equation, driver):
+        return ()
+
+    def blocks(self, values, recording, wanted=None, disturbed=False):
+        load, other = np.sin(2.0 * np.pi * 3.0 * self.time), np.sin(2.0 * np.pi * 21.3 * self.time)
+        rng = np.random.default_rng(self.recordings.index(recording))
+        noise = np.zeros(ROWS) if disturbed else rng.standard_normal(ROWS)
+        residual = noise + (values["load.T"] - self.sizes[0]) * load + self.sizes[1] * other
+        along = {
+            "time": self.time, "rotor_speed": SPEED, "rotor_angle": np.mod(self.time, 2.0 * np.pi),
+            "angle": self.time, "current": SPEED, "output_angle": self.time, "temperature": np.full(ROWS, 20.0),
+            "drivers": np.ones((1, ROWS)), "direction": np.ones(ROWS),
+        }  # fmt: skip
+        columns = {"viscous.scale": SPEED, "load.T": load}
+        usable = np.ones(ROWS, bool)
+        return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], usable, along)]
+
+
+@pytest.mark.parametrize(("sizes", "found"), [((0.6, 0.0), set()), ((0.6, 0.5), {"~frequency_torque_0_first"})])
+def test_what_a_listed_effect_could_be_is_no_form(sizes, found):
+    """Whether or not it acts yet: a form beside it would otherwise be looked for in what the effect does."""
+    bench = Bench(Wave(sizes), Wave.recordings)
+    white = Weights(np.ones(ROWS, bool), np.zeros(0), np.ones(ROWS))
+    bench.carried |= {n: {"torque": white} for n in Wave.recordings}
+    bench._describe("first")
+    assert {d.id for d in bench.described if d.word == "frequency"} == found
+    assert all(d.values["frequency"] == pytest.approx(21.3, abs=0.1) for d in bench.described if d.id in found)

@@ -70,7 +70,18 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
-def held(monkeypatch, misfit, whole, explored, named, described=(), another=-np.inf, change=-50.0, dispersion=1.0):
+def held(
+    monkeypatch,
+    misfit,
+    whole,
+    explored,
+    named,
+    described=(),
+    another=-np.inf,
+    change=-50.0,
+    dispersion=1.0,
+    wandering=(),
+):
     """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
     units = {
         "load_spring": unit("load_spring", "torque"), "load": unit("load", "torque"),
@@ -96,7 +107,7 @@ def held(monkeypatch, misfit, whole, explored, named, described=(), another=-np.
     monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect: another)
     return held_out.held_to_account(
         None, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
-        SimpleNamespace(models=explored, search=search),
+        SimpleNamespace(models=explored, search=search), dict(wandering),
     )  # fmt: skip
 
 
@@ -118,6 +129,19 @@ def test_a_name_that_neither_part_speaks_for_is_none(monkeypatch):
     assert ratios == {"load_spring": 0.5} and kept[0].units == ()
     named = [m for m in kept if "load_spring" in m.units]
     assert kept[0].log_posterior - named[0].log_posterior == pytest.approx(7.5)
+
+
+@pytest.mark.parametrize(("misfit", "named"), [(98.0, ()), (60.0, ("load_spring",))])
+def test_beside_what_no_set_explains_the_held_out_part_decides_by_itself(monkeypatch, misfit, named):
+    """The odds that the explored recordings give a set say nothing of its truth where none is true."""
+    whole = [model(0.0, "load_spring"), model(-50.0)]
+    part = {("load_spring",): misfit, (): 100.0}
+    for wandering, expected in (({}, ("load_spring",)), ({"electrical_a": 9.0}, named)):
+        kept, _, _ = held(monkeypatch, part, whole, [*whole], ["load_spring"], wandering=wandering)
+        assert kept[0].units == expected
+    # the controller's own business is beside nothing
+    kept, _, _ = held(monkeypatch, part, whole, [*whole], ["load_spring"], wandering={"control": 9.0})
+    assert kept[0].units == ("load_spring",)
 
 
 def test_a_name_that_the_explored_recordings_cannot_have_keeps_its_odds(monkeypatch):

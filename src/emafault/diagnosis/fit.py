@@ -1,6 +1,6 @@
 """The fit of a bench: linearise, search, relinearise at what leads, until it stands still."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -168,16 +168,17 @@ class Bench(NormalEquations):
             return False
         names, workers = self._looked_through(), self._workers()
         carried = {n: self.carried[n] for n in names}
-        values, free = self.values(), self._free()
+        # what stands out is what no listed effect could be, whether or not it acts yet
+        values, free = self.values(), self._free({u.id for u in self.units if u.kind in LISTED} | self.on)
         parts = [(values, names, carried, free, mark, k, workers.count) for k in range(workers.count)]
         found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
         found = [f for f in found if not any(f.same(g) for g in self.described)]
         self.describe([*self.described, *found])
         return bool(found)
 
-    def _free(self) -> dict[str, tuple[float, float]]:
-        """What is free at the present point: nuisances and parameters of the units that act, by name of a column."""
-        names = [p.name for u in self.units if u.id in self.on for v in self.active(u) for p in v.parameters]
+    def _free(self, units: Collection[str]) -> dict[str, tuple[float, float]]:
+        """What is free beside a form: nuisances and parameters of some units, by name of a column."""
+        names = [p.name for u in self.units if u.id in units for v in self.active(u) for p in v.parameters]
         return self._full_prior(names, self.columns()[1])
 
     def _keep_likely(self, search: Search) -> None:
@@ -203,7 +204,7 @@ class Bench(NormalEquations):
         mine = [f for f in self.described if f.id in model.units]
         if not mine:
             return False
-        values, free = self.values(), self._free()
+        values, free = self.values(), self._free(self.on)
         blocks = [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=set(free))]
         better = {f.id: refined(self.machine, f, blocks, self.carried, self.point, free) for f in mine}
         before = self.described

@@ -86,6 +86,13 @@ class Left:
             g[at] += self.own_white[k].T @ self.white[k]
             g_slow[at] += rows @ self.weighed[k]
         self._exact, self._slow = _Free(exact, g), _Free(slow, g_slow)
+        #: (row,) inverse covariance times what is left once what is free is fitted
+        self.remaining = [
+            substituted_back(f, b.usable, (white - own @ self._exact.fitted[at]) / np.sqrt(o.variance))
+            for f, b, o, white, own, (at, _) in zip(
+                self.factors, self.blocks, self.weights, self.white, self.own_white, self.own, strict=True
+            )
+        ]
         #: of each recording by itself
         self._alone = [
             _Free(np.diag(1.0 / prior[at, 1] ** 2) + own.T @ own, right[at] + own.T @ white)
@@ -171,6 +178,13 @@ class _Free:
 
     def __len__(self) -> int:
         return len(self.score)
+
+    @property
+    def fitted(self) -> np.ndarray:
+        """(free,) what is free, fitted."""
+        if not len(self.scale):
+            return self.score
+        return self.scale * solve_triangular(self.lower, self.score, lower=True, trans="T", check_finite=False)
 
     def _through(self, x: np.ndarray) -> np.ndarray:
         if not len(self.scale):

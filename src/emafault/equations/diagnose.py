@@ -131,10 +131,11 @@ def diagnose(
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
     ladder = Ladder(every, confirm)
     named = read(all_fit.models, units, observed).named
-    models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit)
+    wanders = wandering.log_odds(every, confirm)
+    models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit, wanders)
     all_fit = replace(all_fit, models=models)
     quality = {n: quality[n] if n in quality else seen(r) for n, r in recordings.items()}
-    final = read(models, units, observed, counted=bool(told(quality)), wandering=wandering.log_odds(every, confirm))
+    final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders)
     held_out = HeldOut(ladder, bench, fit, ratios, changes)
     return _diagnosed(name, split, whole, every, all_fit, final, sealed, held_out, recordings, own, quality)
 

@@ -13,7 +13,7 @@ from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
-from ..diagnosis.naming import NAMED, PRESENT, read
+from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Model, inclusion
 
@@ -34,7 +34,13 @@ class HeldOut:
 
 
 def held_to_account(
-    every: Bench, whole: Fit, named: Sequence[str], ladder: Ladder, explored: Bench, fit: Fit
+    every: Bench,
+    whole: Fit,
+    named: Sequence[str],
+    ladder: Ladder,
+    explored: Bench,
+    fit: Fit,
+    wandering: Mapping[str, float],
 ) -> tuple[list[Model], dict[str, float], dict[str, float]]:
     """Sets of all recordings, those less likely that hold what makes the confirm recordings worse.
 
@@ -48,6 +54,11 @@ def held_to_account(
     with a remainder in its place: no other effect has been shown by that. What is named in consequence is held to
     account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
     whole predicts worse than without its effects, each is tried by itself.
+
+    Where there is a remainder, or what is left wanders (``wandering``: by equation, log odds that it does), none of the
+    sets is the true one, and what the explored recordings give a set is no odds of its truth (the M-open view: Bernardo
+    and Smith 1994, Bayesian Theory, 6.1.2): there the predictive densities of the confirm recordings decide by
+    themselves, beside the prior.
 
     What has another size in each recording is held to account likewise: see ``constancy``.
 
@@ -69,13 +80,15 @@ def held_to_account(
         if ratios[remainder] < CLEAR:
             moved = _moved(whole, models, remainder, False, _log_mass(models, (remainder,)))
             models[:] = [*(m for m in models if remainder not in m.units), *moved]
-    for told in _told(whole, models, ratios):
+    for told, incomplete in _told(whole, models, ratios, wandering):
         effect = max(told, key=lambda u: _log_mass(models, (u,)))  # of a group the likeliest stands for all
         ratio = account.ratio(effect)
         ratios |= dict.fromkeys(told, ratio)
-        odds = _log_odds(fit.models, told) + ratio
+        explored_odds = _log_odds(fit.models, told)
+        odds = (_log_prior_odds(whole, models, effect) if incomplete else explored_odds) + ratio
+        decides = incomplete or ratio < -CLEAR or odds < 0.0
         # of what the explored recordings have no columns they say nothing
-        if np.isfinite(odds) and (ratio < -CLEAR or odds < 0.0) and odds < _log_odds(models, told):
+        if np.isfinite(explored_odds) and decides and odds < _log_odds(models, told):
             models += _moved(whole, models, effect, ratio < -CLEAR, _log_mass(models, told) - odds)
         leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
         models += _dispersed(every, whole, models, leading, effect, told)
@@ -96,14 +109,17 @@ def held_to_account(
     return sorted(models, key=lambda m: -m.log_posterior), ratios, changes
 
 
-def _told(whole: Fit, models: list[Model], ratios: Mapping[str, float]) -> Iterator[tuple[str, ...]]:
-    """Listed effects that the sets, as they are by then, would name, and groups, not yet held to account."""
+def _told(
+    whole: Fit, models: list[Model], ratios: Mapping[str, float], wandering: Mapping[str, float]
+) -> Iterator[tuple[tuple[str, ...], bool]]:
+    """Listed effects that the sets, as they are by then, would name, and groups, not yet held to account; and whether
+    there is a remainder beside them that is not the controller's own business."""
     while True:
-        found = read(models, whole.search.units.values())
+        found = read(models, whole.search.units.values(), wandering=wandering)
         left = [t for t in (*((e,) for e in found.named), *found.groups) if not set(t) <= set(ratios)]
         if not left:
             return
-        yield left[0]
+        yield left[0], not set(found.remainders) <= set(OWN_BUSINESS)
 
 
 def _untold(
@@ -191,8 +207,7 @@ def _dispersed(
     if dispersion == 1.0:
         return []
     gain = leading.log_likelihood - whole.search.less(leading, unit).log_likelihood
-    members = [(c.unit, c.variant) for c in leading.choices]
-    prior = whole.search.log_prior(members) - whole.search.log_prior([m for m in members if m[0] != unit])
+    prior = _log_prior_odds(whole, [leading], unit)
     if len(told) == 1:
         gain = min(gain, _log_odds(models, told) - prior)
     return _moved(whole, models, unit, False, _log_mass(models, told) - (prior + max(gain, 0.0) / dispersion))
@@ -269,6 +284,14 @@ def _occam(ladder: Ladder, whites: Sequence[White], model: Model, fit: Fit) -> f
         H = assemble(mine, names, {}).H
         found += float(np.linalg.slogdet(np.eye(len(names)) + H * np.outer(sd, sd))[1])
     return found
+
+
+def _log_prior_odds(whole: Fit, models: Sequence[Model], unit: str) -> float:
+    """Log prior odds of the likeliest set with a unit over the same without it."""
+    leading = max((m for m in models if unit in m.units), key=lambda m: m.log_posterior)
+    members = [(c.unit, c.variant) for c in leading.choices]
+    log_prior = whole.search.log_prior
+    return float(log_prior(members) - log_prior([m for m in members if m[0] != unit]))
 
 
 def _log_odds(models: Sequence[Model], units: Collection[str]) -> float:

@@ -29,7 +29,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     size = 1 << int(np.ceil(np.log2(2.0 * left.longest / step + 2)))
     frequencies = np.fft.rfftfreq(size, step)
     total = np.zeros(len(frequencies))
-    for b, w in zip(left.blocks, left.weighed, strict=True):
+    for b, w in zip(left.blocks, left.remaining, strict=True):
         t = np.asarray(b.coordinates["time"])
         cells = np.bincount(((t - t[0]) / step).astype(int), w * b.coordinates["drivers"][driver], size)[:size]
         ratio = above(np.abs(np.fft.rfft(cells)) ** 2, 2 * int(AROUND * size * step / (t[-1] - t[0])) + 1)

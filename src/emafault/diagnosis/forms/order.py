@@ -33,7 +33,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     if turns < TURNS:
         return None
     cells = np.zeros(int(turns * CELLS) + 2)
-    for b, w in zip(left.blocks, left.weighed, strict=True):
+    for b, w in zip(left.blocks, left.remaining, strict=True):
         at = ((np.asarray(b.coordinates["angle"]) - first) / (2.0 * np.pi) * CELLS).astype(int)
         cells += np.bincount(at, w * b.coordinates["drivers"][driver], len(cells))
     size = 1 << int(np.ceil(np.log2(2 * len(cells))))
