@@ -3,7 +3,10 @@
 import multiprocessing
 import os
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 from ..processes import end_with
@@ -20,6 +23,16 @@ def _begin(shared: object, parent: int) -> None:
 def _done(call: tuple[str, tuple]):
     method, arguments = call
     return getattr(_shared, method)(*arguments)
+
+
+@contextmanager
+def beside(shared: object, method: str) -> Iterator[Callable[[], Any]]:
+    """Gives the result of ``shared.method()``, done in a forked process meanwhile, or here once it is asked for."""
+    if "fork" not in multiprocessing.get_all_start_methods():
+        yield cache(getattr(shared, method))
+        return
+    with ProcessPoolExecutor(1, multiprocessing.get_context("fork"), _begin, (shared, os.getpid())) as pool:
+        yield pool.submit(_done, (method, ())).result
 
 
 class Workers:

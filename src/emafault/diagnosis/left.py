@@ -10,7 +10,7 @@ from ..compiled import compiled
 from .evidence import Definite
 from .linear import ROUNDING
 from .model import Block
-from .whitening import Weights, factored, substituted, substituted_back
+from .whitening import Weights, substituted, substituted_back
 
 APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
 Shape = Mapping[str, float]
@@ -45,7 +45,7 @@ class Left:
         free: Mapping[str, tuple[float, float]] | None = None,
     ):
         self.equation, self.blocks, self.weights = equation, list(blocks), list(weights)
-        self.factors = [factored(b.bands, b.usable) for b in self.blocks]
+        self.factors = [b.factor for b in self.blocks]
         self.white = [
             self._white(k, np.asarray(b.residual, float)[:, None].copy())[:, 0] for k, b in enumerate(self.blocks)
         ]
@@ -212,11 +212,12 @@ class Scored:
 @compiled
 def _binned(at, weight, rows, count):
     """(row, cell) sums of weighed rows over cells."""
-    out = np.zeros((len(rows), count))
-    for q in range(len(rows)):
-        for k in range(len(at)):
-            out[q, at[k]] += weight[k] * rows[q, k]
-    return out
+    out = np.zeros((count, len(rows)))  # rows side by side: no sum waits for the one before it
+    for k in range(len(at)):
+        w, cell = weight[k], at[k]
+        for q in range(len(rows)):
+            out[cell, q] += w * rows[q, k]
+    return out.T
 
 
 def gain(g: np.ndarray, G: np.ndarray) -> float:

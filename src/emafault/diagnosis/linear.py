@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..compiled import compiled
 from .evidence import Definite, Normal, factored
 from .model import Block
-from .whitening import OUTLIER, Weights, coloured, filtered, products, whiten
+from .whitening import OUTLIER, Weights, coloured, filtered, products, substituted
 
 OWN = slice(0, 14)  # functions of an own form; the first is constant, for it may differ between equations
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
@@ -75,7 +76,16 @@ def white_rows(
 ) -> tuple[list[str], np.ndarray]:
     """A block's columns as ``raw_columns`` has them: names, and (row, column) divided by the noise's covariance."""
     names, columns = raw_columns(block, wanted, remainder, own)
-    return names, whiten(block.bands, block.usable, columns_of(columns, len(block.residual)))
+    rows = columns_of(columns, len(block.residual))
+    substituted(block.factor, block.usable, rows)
+    return names, rows
+
+
+def _white(block: Block, x: np.ndarray) -> np.ndarray:
+    """(row,) divided by the noise's covariance."""
+    rows = np.array(x, float)[:, None]
+    substituted(block.factor, block.usable, rows)
+    return rows[:, 0]
 
 
 def raw_columns(
@@ -113,7 +123,7 @@ def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weight
 def compressed_columns(block: Block, names: list[str], columns: Sequence, weights: Weights | None) -> White:
     """The same of raw columns, without all of their white rows in memory at once."""
     w = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
-    gram = products(block.bands, block.usable, columns, w)
+    gram = products(block.factor, block.usable, columns, w)
     return White(block.recording, block.equation, names, gram, int(w.usable.sum()))
 
 
@@ -146,9 +156,9 @@ def disturbance(
     used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
     residual = np.asarray(disturbed.residual - block.residual)
     # a draw that is an outlier, as an edge moved into the next interval, would not have been used
-    drawn = whiten(block.bands, block.usable, residual[:, None].astype(float))[:, 0]
+    drawn = _white(block, residual)
     used = replace(used, usable=used.usable & (np.abs(drawn) < OUTLIER * np.sqrt(used.variance)))
-    some = products(block.bands, block.usable, [*changed.values(), residual], used)
+    some = products(block.factor, block.usable, [*changed.values(), residual], used)
     index = {n: k for k, n in enumerate(names)}
     k = np.array([*(index[n] for n in changed), len(names)], int)
     gram = np.zeros((len(names) + 1, len(names) + 1))
@@ -202,12 +212,20 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
                 source.append(k)
                 target.append(t)
         rows, into = np.array(source, int), np.array(target, int)
-        H[np.ix_(into, into)] += w.gram[np.ix_(rows, rows)]
+        _add(H, w.gram, rows, into)
         g[into] += w.gram[rows, -1]
         c += w.gram[-1, -1] - w.own
         if w.noise is not None:
-            noise[np.ix_(into, into)] += w.noise[np.ix_(rows, rows)]
+            _add(noise, w.noise, rows, into)
     return Normal(list(names), *_as_sure(H, g, noise), c)
+
+
+@compiled
+def _add(H, gram, rows, into):
+    """Adds some ``rows`` and columns of a matrix to those of another where they go ``into``, each to its own."""
+    for k in range(len(rows)):
+        for m in range(len(rows)):
+            H[into[k], into[m]] += gram[rows[k], rows[m]]
 
 
 def _as_sure(H: np.ndarray, g: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -258,7 +276,7 @@ def weights_from(
     raw = np.array(block.residual, float)
     for n, column in zip(names, columns, strict=False):
         raw += deviations.get(n, 0.0) * column
-    left = whiten(block.bands, usable, raw[:, None])[:, 0]
+    left = _white(block, raw)
     scale = np.median(np.abs(left[usable])) / 0.6745
     out = usable & (np.abs(left) > OUTLIER * max(scale, 1e-12))
     keep = usable & ~(out | np.roll(out, 1))

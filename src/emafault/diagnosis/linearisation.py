@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .described import Described, Proposal, scanned, with_forms
-from .linear import White, compressed_columns, correct, disturbance, raw_columns, weights_from
+from .left import Left
+from .linear import FEW, White, assemble, compressed_columns, correct, disturbance, raw_columns, weights_from
 from .model import SETTINGS, Block
 from .whitening import Weights
 
@@ -91,6 +92,20 @@ class Linearisation:
         """See ``scanned``: of recordings at a point."""
         blocks = [b for n in names for b in self.machine.blocks(values, n, wanted=set(free))]
         return scanned(self.machine, blocks, carried, free, mark, part, parts)
+
+    @staticmethod
+    def load() -> None:
+        """Load what is compiled: processes that are forked afterwards need not, each for itself."""
+        rows = 2 * FEW
+        block = Block("", "", np.cos(np.arange(rows)), {"x": np.ones(rows)}, [np.ones(rows)], np.ones(rows, bool))
+        names, columns = raw_columns(block, ["x"], False)
+        weights = weights_from(block, names, columns, {}, leads=True)
+        white = compressed_columns(block, names, columns, weights)
+        correct(white, disturbance(block, block, names, weights))
+        assemble([white], names, {})
+        cells = Left("", [block], [weights], {"x": (0.0, 1.0)})
+        block.coordinates["drivers"] = np.ones((1, rows))
+        cells.cells(lambda b: np.zeros(rows, int), 1, 0)
 
     def _blocks(self, task: Task, recording: str) -> list[Block]:
         return self.machine.blocks(task.values, recording, wanted=set(task.wanted))

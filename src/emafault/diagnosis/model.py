@@ -2,8 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+
+from .whitening import factored
 
 LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
@@ -78,3 +81,8 @@ class Block:
     bands: list[np.ndarray]
     usable: np.ndarray
     coordinates: dict = field(default_factory=dict)
+
+    @cached_property
+    def factor(self) -> np.ndarray:
+        """(band, row) Cholesky factor of the noise's covariance, computed once."""
+        return factored(self.bands, self.usable)

@@ -111,6 +111,8 @@ class NormalEquations(Point):
             several = min(self.processes, len(self.recordings))
             for name in self.recordings if several > 1 else ():
                 self.machine.prepare(name)
+            if several > 1:
+                Linearisation.load()
             self.workers = Workers(self, Linearisation(self.machine), several)
         return self.workers
 

@@ -124,7 +124,7 @@ class Point:
     def _within_reach(self, name: str, deviation: float) -> float:
         """A deviation no further than the prior has any mass: a model that lacks the cause asks for more."""
         mean, sd, _ = self.prior(name)
-        return float(np.clip(deviation, mean - self.reach * sd, mean + self.reach * sd))
+        return float(min(max(deviation, mean - self.reach * sd), mean + self.reach * sd))
 
     def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:
         """An effect found along a secant gets parameters of its own."""

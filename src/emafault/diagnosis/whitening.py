@@ -148,12 +148,11 @@ class Weights:
     wandering: tuple[float, ...] = ()
 
 
-def products(bands: list[np.ndarray], usable: np.ndarray, columns: Sequence, weights: Weights) -> np.ndarray:
-    """(column, column) products of columns, each (row,) or a scalar, whitened and filtered: part after part, so that
-    they are never all in memory."""
-    n, m = len(bands[0]), len(columns)
-    lower = factored(bands, usable)
-    before, memory = np.zeros((len(bands), m)), np.zeros((len(weights.coefficients) + 1, m))
+def products(lower: np.ndarray, usable: np.ndarray, columns: Sequence, weights: Weights) -> np.ndarray:
+    """(column, column) products of columns, each (row,) or a scalar, divided by the factor ``lower`` of a covariance
+    and filtered: part after part, so that they are never all in memory."""
+    n, m = lower.shape[1], len(columns)
+    before, memory = np.zeros((len(lower), m)), np.zeros((len(weights.coefficients) + 1, m))
     level, out = np.zeros(m), np.zeros((m, m))
     scale = 1.0 / np.sqrt(weights.variance)
     for start in range(0, n, TILE):

@@ -55,10 +55,9 @@ class Dual:
             return self.through(_times(self.value, other), other)
         if not other.slopes:
             return self.through(_times(self.value, other.value), other.value)
-        out = {} if _is(other.value, 0.0) else {n: _times(s, other.value) for n, s in self.slopes.items()}
+        out = _all_times(self.slopes, other.value)
         if not _is(self.value, 0.0):
-            for name, slope in other.slopes.items():
-                term = _times(slope, self.value)
+            for name, term in _all_times(other.slopes, self.value).items():
                 out[name] = out[name] + term if name in out else term
         return Dual(_times(self.value, other.value), out)
 
@@ -82,7 +81,7 @@ class Dual:
             return Dual(value, self.slopes)
         if _is(slope, 0.0):
             return Dual(value)
-        return Dual(value, {n: _times(s, slope) for n, s in self.slopes.items()})
+        return Dual(value, _all_times(self.slopes, slope))
 
     def linear(self, operate: Callable[[np.ndarray], np.ndarray], size: int) -> "Dual":
         """A linear operator on arrays of ``size`` samples, a shift or a filter."""
@@ -112,6 +111,15 @@ def _times(x: Number, y: Number) -> Number:
     if isinstance(y, float) and (y == 1.0 or y == 0.0):
         return x if y == 1.0 else 0.0
     return x * y
+
+
+def _all_times(slopes: dict[str, Number], x: Number) -> dict[str, Number]:
+    """All of them times x, as ``_times`` has it; none where x is a scalar 0."""
+    if isinstance(x, float):
+        if x == 1.0 or x == 0.0:
+            return dict(slopes) if x == 1.0 else {}
+        return {n: s * x for n, s in slopes.items()}
+    return {n: _times(s, x) if isinstance(s, float) else s * x for n, s in slopes.items()}
 
 
 def value_of(x: "Dual | Number") -> Number:

@@ -2,7 +2,7 @@
 
 import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,8 +105,13 @@ class Detail:
     numbers: Numbers
 
 
-def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], detail: Detail | None = None) -> Page:
-    """The page of one diagnosis."""
+def draw(
+    verdict: Mapping[str, Any],
+    truths: Mapping[str, Any],
+    detail: Detail | None = None,
+    following: Callable[[], Sequence[Mapping[str, Any]]] | None = None,
+) -> Page:
+    """The page of one diagnosis; ``following`` gives what to record next, asked once all else is drawn."""
     # what draws takes half a second to import, and the verdict does not wait
     from ..reporting import diagnosis as figures
 
@@ -216,7 +221,7 @@ def draw(verdict: Mapping[str, Any], truths: Mapping[str, Any], detail: Detail |
             e["command"], f"{e['ambient_temperature']:g} °C",
             separated(e["separates"]), f"{e['expected_odds']:.3g}",
         ]
-        for e in verdict["next_experiment"]
+        for e in (verdict["next_experiment"] if following is None else following())
     ]  # fmt: skip
     page.table(["command", "ambient temperature", "distinguishes", "expected Bayes factor"], rows)
     page.heading("Sealed before the validation recordings were opened")

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
+from ..diagnosis.forked import beside
 from ..io.atomic import write_text
 from ..io.bench import Bench, bench_name, new_folder, read_bench
 from ..io.split import split_bench
@@ -123,13 +124,14 @@ def _differing(actuator: ActuatorParameters) -> dict[str, Any]:
 def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path | None = None) -> None:
     """Write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``, the last also to ``experiment``."""
     verdict = found.verdict
-    verdict["next_experiment"] = found.next_experiments()
+    with beside(found, "next_experiments") as following:  # takes as long as the pictures
+        truths = {n: r.fault for n, r in bench.recordings.items()}
+        page = draw(verdict, truths, Detail(panels(found), numbers(found)), following)
+        verdict["next_experiment"] = following()
     name = f"diagnosed_{file_name(bench.name)}"
     text = experiment_text(verdict, verdict["simulator"]["after"], name, _differing(found.bench.machine.actuator))
     last = checked(verdict)
-    truths = {n: r.fault for n, r in bench.recordings.items()}
-    detail = Detail(panels(found), numbers(found))
-    draw(verdict, truths, detail).write(folder / REPORT)
+    page.write(folder / REPORT)
     write_text(folder / EXPERIMENT, text)
     if experiment is not None:
         write_text(experiment, text)

@@ -11,8 +11,15 @@ RECORDED_LAST = True
 
 def voltage(p, j, volts):
     """Recorded voltage of phase j (V) from those before it."""
+    on = p("on")
+    if on.value == 0.0:  # and with it every derivative of the mean
+        return volts[j] - on * _mean(p, [v.value for v in volts]).value if on.slopes else volts[j]
+    return volts[j] - on * _mean(p, volts)
+
+
+def _mean(p, volts):
     uneven = p("w_a") * (volts[0] - volts[2]) + p("w_b") * (volts[1] - volts[2])
-    return volts[j] - p("on") * ((volts[0] + volts[1] + volts[2] + uneven) * (1.0 / 3.0))
+    return (volts[0] + volts[1] + volts[2] + uneven) * (1.0 / 3.0)
 
 
 def report(values, spread):
