@@ -1,6 +1,6 @@
 """What one equation leaves in all recordings at a point, as the scans of described forms take it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +62,7 @@ class Left:
                 [self._white(k, np.ones((len(b.residual), 1)))[:, 0] for k, b in enumerate(self.blocks)], strict=True,
             )
         ]  # fmt: skip
+        self._once: dict[Hashable, np.ndarray] = {}
         self._take_out(free or {})
 
     def _take_out(self, free: Mapping[str, tuple[float, float]]) -> None:
@@ -131,6 +132,12 @@ class Left:
             power += np.bincount(at, known * d * d, count)
             cross[own] += _binned(at, known * d, rows, count)
         return Scored(g, power, cross, self._slow)
+
+    def once(self, key: Hashable, compute: Callable[[], np.ndarray]) -> np.ndarray:
+        """What several drivers are asked with, computed at the first call with this key."""
+        if key not in self._once:
+            self._once[key] = compute()
+        return self._once[key]
 
     def products(self, columns: Columns, driver: int) -> tuple[np.ndarray, np.ndarray]:
         """Score (column,) and information (column, column) of columns times a driver over all recordings."""

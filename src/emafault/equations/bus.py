@@ -36,7 +36,10 @@ def noise_bands(state: State) -> list[np.ndarray]:
 
 def usable(state: State) -> np.ndarray:
     """(sample,) where the currents tell the power, and have for as long as the supply remembers."""
-    rec = state.rec
+    return state.rec.once(("bus", "usable"), lambda: _usable(state.rec))
+
+
+def _usable(rec) -> np.ndarray:
     reach = max(1, round(MEMORY / rec.interval))
     out = ~binary_dilation(~rec.resolved, np.arange(-reach, reach + 1) >= 0)
     out[0] = False

@@ -82,12 +82,16 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
 def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(row,) by how long a passing over scatters (s), how far an edge and its interval's ends are uncertain and the
     interval's width (electrical rad)."""
-    rec, a = state.rec, state.rec.actuator
-    rows = rows_of(state, j)
+    rec, rows = state.rec, rows_of(state, j)
+    return rec.once(("spread", j), lambda: _new_spread(rec, rows, j, high - low))
+
+
+def _new_spread(rec, rows: np.ndarray, j: int, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    a = rec.actuator
     scatter = a.inductance / a.bus_voltage * (a.hysteresis + PASSING * np.abs(rec.current[rows, STAYS[j]]))
     ends = a.pole_pairs * rec.noise.angle
     reach = np.hypot(a.pole_pairs * np.abs(rec.speed[rows]) * scatter, ends)
-    return scatter, reach, np.maximum(high - low, ends)
+    return scatter, reach, np.maximum(width, ends)
 
 
 def _above_zero(z: np.ndarray) -> np.ndarray:

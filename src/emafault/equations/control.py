@@ -80,11 +80,15 @@ def _sensors_show(state: State) -> np.ndarray:
     the two phases that are switched on show, each in the direction in which the pair's current is counted."""
     rec = state.rec
     out = np.zeros(rec.size)
-    for j in range(3):
-        f = np.sin(rec.actuator.pole_pairs * rec.middle - rec.axis[j])
-        on = np.where(np.abs(f) > np.sin(commutation.EDGE), np.sign(f), 0.0)
+    for j, on in enumerate(rec.once(("counted",), lambda: [_counted(rec, phase) for phase in range(3)])):
         out += 0.5 * on * (rec.current[:, j] - np.asarray(value_of(state.current[j])))
     return out
+
+
+def _counted(rec, j: int) -> np.ndarray:
+    """(sample,) sign in which the current of phase j is the pair's, 0 where it is not switched on."""
+    f = np.sin(rec.actuator.pole_pairs * rec.middle - rec.axis[j])
+    return np.where(np.abs(f) > np.sin(commutation.EDGE), np.sign(f), 0.0).astype(np.int8)
 
 
 def _beyond(state: State) -> np.ndarray:
@@ -97,11 +101,16 @@ def _beyond(state: State) -> np.ndarray:
     """
     rec, a = state.rec, state.rec.actuator
     charge = 0.5 * a.inductance * rec.level**2 / _supply(rec, np.sign(state.drive))
-    edges = np.zeros(rec.size)
+    return rec.once(("edges",), lambda: _edges(rec)) * charge / rec.interval
+
+
+def _edges(rec) -> np.ndarray:
+    """(sample,) number of commutations in each interval."""
+    edges = np.zeros(rec.size, np.int8)
     for j in range(3):
         low, high, _ = commutation.sweep(rec, j)
         edges += (low < 0.0) & (high >= 0.0) & rec.moving
-    return edges * charge / rec.interval
+    return edges
 
 
 def _lacking(rec, sign: np.ndarray) -> np.ndarray:

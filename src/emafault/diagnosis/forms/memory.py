@@ -21,26 +21,35 @@ FINER = np.geomspace(0.6, 1.0 / 0.6, 7)
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
     """(1, row) the source through a first-order lag."""
-    return _filtered(coordinates, int(shape["source"]), shape["time_constant"])[None]
+    return _filtered(coordinates, int(shape["source"]), shape["time_constant"], _step(coordinates))[None]
 
 
-def _filtered(coordinates: Mapping, source: int, constant: float) -> np.ndarray:
+def _filtered(coordinates: Mapping, source: int, constant: float, step: float) -> np.ndarray:
     if SOURCES[source] == "loss":
         x = (0.5 * np.asarray(coordinates["current"])) ** 2
     elif SOURCES[source] == "start":
         return 1.0 - np.exp(-np.asarray(coordinates["time"]) / constant)
     else:
         x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
-    steps = np.diff(coordinates["time"])
-    share = 1.0 - np.exp(-float(np.median(steps)) / constant) if len(steps) else 1.0
+    share = 1.0 - np.exp(-step / constant)
     return followed(x, share, 1.0 - share)
+
+
+def _step(coordinates: Mapping) -> float:
+    """Time between rows (s)."""
+    steps = np.diff(coordinates["time"])
+    return float(np.median(steps)) if len(steps) else np.inf
 
 
 def _values(left: Left, driver: int, tried: list[tuple[int, float]], slow: bool = False) -> np.ndarray:
     def of(b: Block) -> np.ndarray:
-        return np.array([np.ones(len(b.residual)), *(_filtered(b.coordinates, *s) for s in tried)])
+        step = _step(b.coordinates)
+        return np.array([np.ones(len(b.residual)), *(_filtered(b.coordinates, *s, step) for s in tried)])
 
-    return singly(*beside_first(*(left.slowly if slow else left.products)(of, driver)))
+    if not slow:
+        return singly(*beside_first(*left.products(of, driver)))
+    # of all drivers alike
+    return singly(*beside_first(*left.slowly(lambda b: left.once(("memory", b.recording), lambda: of(b)), driver)))
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:

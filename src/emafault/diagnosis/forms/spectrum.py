@@ -10,8 +10,15 @@ def above(power: np.ndarray, width: int) -> np.ndarray:
     count = max(1, len(power) // width)
     parts = np.array_split(power, count)
     middle = np.cumsum([0, *(len(p) for p in parts[:-1])]) + [0.5 * len(p) for p in parts]
-    level = np.interp(np.arange(len(power)), middle, [np.median(p) for p in parts]) / np.log(2.0)
+    level = np.interp(np.arange(len(power)), middle, _medians(parts)) / np.log(2.0)
     return power / np.maximum(level, 1e-300)
+
+
+def _medians(parts: list[np.ndarray]) -> np.ndarray:
+    """Median of each part; the first ones are longer by one, if any are."""
+    longer = sum(len(p) > len(parts[-1]) for p in parts)
+    same = [some for some in (parts[:longer], parts[longer:]) if some]
+    return np.concatenate([np.median(np.array(some), axis=1) for some in same])
 
 
 def refined(at: float, half: float, likelihood: Callable[[float], float]) -> tuple[float, float]:
