@@ -1,8 +1,11 @@
 """Calls in forked processes: in order, each where what it kept is, and what is told reaches all of them."""
 
+import multiprocessing
 import os
 
-from emafault.diagnosis.forked import Workers
+import pytest
+
+from emafault.diagnosis.forked import Workers, beside
 
 
 class Shared:
@@ -19,6 +22,13 @@ class Shared:
 
     def multiply(self, factor):
         self.factor = factor
+
+    def place(self):
+        self.factor += 1
+        return os.getpid(), self.factor
+
+    def refused(self):
+        raise LookupError("not there")
 
 
 NAMES = ["a", "b", "c", "d", "e"]
@@ -47,3 +57,23 @@ def test_one_process_does_all_here():
     workers.tell("multiply", 3)
     assert workers.map("keep", [("a",)]) == ["a"] and shared.kept == {"a": os.getpid()}
     assert workers.map("of", [("a",)], [1]) == [3]
+
+
+def test_what_is_done_beside_leaves_everything_here_as_it_was():
+    shared = Shared()
+    with beside(shared, "place") as found:
+        assert found() == found()
+    assert found()[0] != os.getpid() and found()[1] == 2 and shared.factor == 1
+
+
+def test_what_fails_beside_fails_where_it_is_asked_for():
+    with pytest.raises(LookupError, match="not there"), beside(Shared(), "refused") as found:
+        found()
+
+
+def test_without_fork_it_is_done_here_once(monkeypatch):
+    monkeypatch.setattr(multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    shared = Shared()
+    with beside(shared, "place") as found:
+        assert shared.factor == 1
+        assert found() == found() == (os.getpid(), 2)

@@ -187,6 +187,16 @@ def test_derivatives_against_differences(effect):
     assert checked > 0
 
 
+def test_off_a_virtual_neutral_has_the_columns_that_it_has_next_to_off(nominal):
+    off = {n: p.off for n, p in nominal.parameters.items()}
+    pairs = zip(nominal.blocks(off, "a.nc"), nominal.blocks(off | {"virtual_neutral.on": 1e-9}, "a.nc"), strict=True)
+    for x, y in ((x, y) for x, y in pairs if x.equation.startswith("electrical")):
+        assert np.allclose(x.residual, y.residual, rtol=0.0, atol=1e-6)
+        assert np.any(x.columns["virtual_neutral.on"])
+        for name in y.columns:
+            assert np.allclose(x.columns.get(name, 0.0), y.columns[name], rtol=1e-6, atol=1e-6), (x.equation, name)
+
+
 def test_controller_gains_stand_in_the_control_equation_alone(nominal):
     values = {n: p.off for n, p in nominal.parameters.items()}
     for block in nominal.blocks(values, "a.nc"):

@@ -5,6 +5,8 @@ staying phase times the share of the interval beyond the edge. The time that a c
 controller's own: a constant and a part in proportion to the current.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.special import ndtr
 
@@ -53,13 +55,12 @@ def residual(state: State) -> Dual:
         above, below = (high - edge.value) / reach, (low - edge.value) / reach
         share = reach * (_above_zero(above) - _above_zero(below)) / width
         out.append(own + edge.through(share, (ndtr(below) - ndtr(above)) / width) * stays)
-    names = {n for d in out for n in d.slopes}
-    sizes = [len(np.atleast_1d(d.value)) for d in out]
-    slopes: dict[str, Number] = {
-        n: np.concatenate([np.broadcast_to(d.slopes.get(n, 0.0), size) for d, size in zip(out, sizes, strict=True)])
-        for n in names
-    }
-    return Dual(np.concatenate([np.atleast_1d(d.value) for d in out]), slopes)
+    ends = np.cumsum([0, *(len(np.atleast_1d(d.value)) for d in out)]).tolist()
+    slopes = {n: np.zeros(ends[-1]) for d in out for n in d.slopes}
+    for d, (first, end) in zip(out, pairwise(ends), strict=True):
+        for n, slope in d.slopes.items():
+            slopes[n][first:end] = slope
+    return Dual(np.concatenate([np.atleast_1d(d.value) for d in out]), dict[str, Number](slopes))
 
 
 def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Dual]:

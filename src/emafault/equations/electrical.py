@@ -48,7 +48,9 @@ def voltages(state: State) -> list[Dual]:
 
 
 def _difference(x: np.ndarray) -> np.ndarray:
-    return np.diff(x, prepend=0.0)
+    out = np.array(x, float)
+    out[1:] -= x[:-1]
+    return out
 
 
 def _by_curvature(state: State, j: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping
 from copy import copy
+from functools import cache
 
 import numpy as np
 
@@ -40,6 +41,7 @@ class Point:
         return lambda name: self(f"{effect}.{name}")
 
 
+@cache
 def effect_name(module) -> str:
     """Name of an effect from its file of terms."""
     return module.__name__.rsplit(".", 1)[-1]
