@@ -132,7 +132,11 @@ def _best_order(score: np.ndarray, margin: float = 0.5) -> tuple[int, ...] | Non
 
 
 def _refuse_swapped_phases(path: str, recording: Recording, actuator: ActuatorParameters) -> None:
-    """Voltages regressed on all currents and on all back-EMF shapes show which of them belong to which phase."""
+    """Voltages regressed on all currents, their rises and all back-EMF shapes show which of them belong to which phase.
+
+    At speed the rise of a current takes more voltage than its resistance where L p w is beyond R, and goes with the
+    difference of the other two: without it these would seem to drive the phase.
+    """
     theta, dt = recording.rotor_angle, recording.interval
     middle = 0.5 * (theta[1:] + theta[:-1])
     half = max(1, round(3e-4 / dt))
@@ -143,15 +147,20 @@ def _refuse_swapped_phases(path: str, recording: Recording, actuator: ActuatorPa
         return
     x = actuator.pole_pairs * middle[moving, None] - AXIS
     shape = np.clip(np.arcsin(np.sin(x)) * 6.0 / np.pi, -1.0, 1.0) * actuator.back_emf * w[moving, None]
-    current = recording.phase_current[1:][moving] * actuator.resistance
-    columns = np.concatenate([current - current.mean(1, keepdims=True), shape, np.ones((len(shape), 1))], axis=1)
+    mean, ends = recording.phase_current, recording.phase_current_end
+    rise = np.gradient(mean, axis=0)[1:] if ends is None else np.diff(ends, axis=0)
+    driven = [mean[1:][moving] * actuator.resistance, rise[moving] * actuator.inductance / dt]
+    driven = [values - values.mean(1, keepdims=True) for values in driven]
+    columns = np.concatenate([*driven, shape, np.ones((len(shape), 1))], axis=1)
     scale = np.sqrt((columns**2).mean(0))
     if np.any(scale < 1e-9):
         return
     solution, *_ = np.linalg.lstsq(columns / scale, recording.phase_voltage[1:][moving], rcond=1e-6)
     gains = (solution / scale[:, None]).T  # (phase, column), 1 where all is as the file says
-    of_current = gains[:, :3] - gains[:, :3].mean(1, keepdims=True) + 1.0 / 3.0
-    of_shape = gains[:, 3:6]
+    share = np.array([(values**2).sum() for values in driven])
+    of_current = np.tensordot(share / share.sum(), gains[:, :6].reshape(3, 2, 3), (0, 1))
+    of_current += 1.0 / 3.0 - of_current.mean(1, keepdims=True)
+    of_shape = gains[:, 6:9]
     size = np.sqrt((shape**2).mean())
     if np.trace(of_current) < -0.5:
         raise InputError(f"{path}: phase_current has the wrong sign against phase_voltage; it counts into the motor")
