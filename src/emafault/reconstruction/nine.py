@@ -37,7 +37,7 @@ from .factors import backward, factor, forward, project
 from .features import Features, Signals, check_number, read_settings
 from .goodness import by_stretch, stretches
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, is_singular
-from .noise import LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, stated_noise
+from .noise import LEAST_RATE, LEAST_VOLTAGE, USUAL_VOLTAGE, NoiseLevels, split_noise, stated_noise
 from .rows import OFF_HALF_WIDTH, is_zero
 from .weighted import LOOSE_INDUCTANCE, WeightedSettings, fit_runs
 
@@ -91,17 +91,12 @@ class NineFit:
 def angles_turned(speed: np.ndarray, angle: np.ndarray, interval: float) -> tuple[np.ndarray, float]:
     """(time,) rotor angles (rad) at the intervals' ends from recorded angles and speeds together; their rate's noise.
 
-    Both noises are told by the difference of speed and rate of the angle: that of the angle makes neighbours
-    anti-correlated. The rate's noise (rad/s) is the mean of 1/(1/s^2 + 1/(4 a^2 sin^2(x/2))) over frequencies x, with s
-    that of the speed and a that of an angle over the interval.
+    The rate's noise (rad/s) is the mean of 1/(1/s^2 + 1/(4 a^2 sin^2(x/2))) over frequencies x, with s that of the
+    speed and a that of an angle over the interval.
     """
-    difference = speed[1:] - np.diff(angle) / interval
-    difference = difference - np.mean(difference)
-    of_angle = max(-float(np.mean(difference[1:] * difference[:-1])), 0.0)  # variance of an angle over interval^2
-    of_speed = float(np.mean(difference**2)) - 2.0 * of_angle
-    if of_angle <= 1e-12 * max(of_speed, 0.0) or of_angle < 1e-18:
+    of_speed, of_angle = split_noise(speed, angle, interval)
+    if of_angle <= 1e-12 * of_speed or of_angle < LEAST_RATE:
         return angle, 0.0
-    of_speed = max(of_speed, 1e-6 * of_angle)
     ratio = of_angle / of_speed
     band = np.zeros((2, len(angle)))
     band[0] = 1.0 + 2.0 * ratio

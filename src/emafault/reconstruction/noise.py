@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ..errors import InputError
 from .features import Signals
@@ -12,6 +13,9 @@ from .rows import Rows
 
 LEAST_VOLTAGE = 1e-6  # V; a record without noise is weighted as if it had this
 USUAL_VOLTAGE = 0.05  # V; for the first weights of a record whose noise is to be estimated
+LEAST_RATE = 1e-18  # (rad/s)^2, below which speed and angle agree but for rounding
+FEWEST_FREQUENCIES = 10
+RATIOS = (-14.0, 14.0)  # logarithm of the angle's noise over the speed's, variances
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ def sensor_noise(signals: Signals, run: int, rows: Sequence[Rows]) -> NoiseLevel
     """Current and speed noise of one run from its record; the voltage noise is left to the residuals of a fit.
 
     Currents: their scatter where the phase floats, so ``rows`` must hold floating samples. Speed: its difference from
-    the angle turned, whose own noise shows as the covariance of neighbours.
+    the angle turned, see ``split_noise``.
     """
     mean, end = [], []
     for j, r in enumerate(rows):
@@ -53,12 +57,34 @@ def sensor_noise(signals: Signals, run: int, rows: Sequence[Rows]) -> NoiseLevel
             mean.append(np.var(signals.current[run, zero, j]))
             if signals.current_end is not None:
                 end.append(np.var(signals.current_end[run, zero, j]))
-    difference = signals.speed[run, 1:] - np.diff(signals.angle[run]) / signals.interval
-    difference = difference - np.mean(difference)
-    speed = np.mean(difference**2) + 2.0 * np.mean(difference[1:] * difference[:-1])
+    speed, _ = split_noise(signals.speed[run], signals.angle[run], signals.interval)
     return NoiseLevels(
         voltage=USUAL_VOLTAGE,
         current=float(np.sqrt(np.mean(mean))) if mean else 0.0,
         current_end=float(np.sqrt(np.mean(end))) if end else 0.0,
-        speed=float(np.sqrt(max(speed, 0.0))),
+        speed=float(np.sqrt(speed)),
     )
+
+
+def split_noise(speed: np.ndarray, angle: np.ndarray, interval: float) -> tuple[float, float]:
+    """Variances of recorded speeds and of recorded angles over the interval ((rad/s)^2), from how both differ.
+
+    The difference has the spectrum s^2 + 4 a^2 sin^2(x/2). Its likelihood (Whittle, Arkiv for Matematik 2, 1953, 423)
+    takes the speed's noise from low frequencies: of short intervals, where the angle's is most of all, the difference
+    of mean squares would leave nothing or less by chance.
+    """
+    difference = speed[1:] - np.diff(angle) / interval
+    difference = difference - np.mean(difference)
+    power = np.abs(np.fft.rfft(difference)[1:]) ** 2 / max(len(difference), 1)
+    total = float(np.mean(difference**2)) if len(difference) else 0.0
+    if len(power) < FEWEST_FREQUENCIES or total < LEAST_RATE:
+        return 0.0, 0.0
+    wave = 4.0 * np.sin(np.pi * np.arange(1, len(power) + 1) / len(difference)) ** 2
+
+    def misfit(log_ratio: float) -> float:
+        shape = 1.0 + np.exp(log_ratio) * wave
+        return float(np.mean(np.log(shape)) + np.log(np.mean(power / shape)))
+
+    ratio = float(np.exp(minimize_scalar(misfit, bounds=RATIOS, method="bounded", options={"xatol": 0.01}).x))
+    of_speed = float(np.mean(power / (1.0 + ratio * wave)))
+    return of_speed, ratio * of_speed
