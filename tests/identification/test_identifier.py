@@ -242,3 +242,19 @@ def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fre
     straight = evaluation.evaluate(fit.identifier, evaluation.FeatureSet(fresh.features * bias, fresh.faults), width)
     calibrated = evaluation.evaluate(fit.identifier, off, width, unit=unit * bias)
     assert calibrated["errors"]["dT"]["mae"] < 1.1 * straight["errors"]["dT"]["mae"]
+
+
+def test_a_bias_that_a_healthy_record_takes_out_is_not_in_its_intervals(fresh, training, actuator, tmp_path):
+    bias = np.array([1.3, 1.3, 1.3, 0.9, 0.9, 0.9])  # 75 K of dT
+    fit = fit_identifier("closed_form", training.features * bias, training.faults, actuator, **SETTINGS)
+    fit.identifier.save(tmp_path)
+    identifier = Identifier.load(tmp_path)
+    unit = nominal_nine(actuator)[:6] * np.repeat([1.01, 0.995], 3)
+    of_unit = fresh.features * bias * np.repeat([1.01, 0.995], 3)
+    shown = {"without": (fresh.features * bias, None), "with": (of_unit, unit * bias)}
+    widths = {}
+    for name, (features, own) in shown.items():
+        low, high = identifier.interval(features, 0.9, None, own)
+        widths[name] = np.mean(high - low, axis=0)[5]
+        assert abs(coverage(low, high, fresh.faults)["mean"] - 0.9) < 0.03, name
+    assert widths["without"] > 100.0 and widths["with"] < 10.0

@@ -28,7 +28,7 @@ FILE = "identifier.json"
 _FORMAT = 1
 _KEYS = (
     "format", "estimator", "actuator", "alpha_m", "lag", "intervals", "network", "feature_low", "feature_high",
-    "healthy", "known", "noise",
+    "healthy", "known", "noise", "intervals_of_units",
 )  # fmt: skip
 
 
@@ -54,6 +54,8 @@ class Identifier:
     healthy: np.ndarray | None = None  # R, k (and L) that it takes for healthy at 20 degC; None: the nominal ones
     known: Knowledge = field(default_factory=Knowledge)  # of any unit and its magnets, beforehand
     noise: np.ndarray | None = None  # (6, 6) relative covariance of R and k, of a reconstruction that tells none
+    #: of units with healthy recordings, where these take out a bias that ``intervals`` hold; None: the same
+    intervals_of_units: ConformalIntervals | None = None
 
     @property
     def estimator(self) -> str:
@@ -107,11 +109,12 @@ class Identifier:
         so does, without ``unit``, what is not known of any unit.
         """
         untold = covariance is None
+        intervals = self.intervals if unit is None or self.intervals_of_units is None else self.intervals_of_units
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
         value, variance = _estimate(self, features, covariance), _variance(self, features, covariance)
         if untold and variance is not None:  # that of the unit alone
-            variance = variance + self.intervals.typical_variance
-        half = self.intervals.half_width(level, variance, len(features))
+            variance = variance + intervals.typical_variance
+        half = intervals.half_width(level, variance, len(features))
         return value - half, value + half
 
     def estimate(
@@ -212,6 +215,7 @@ class Identifier:
             "healthy": None if self.healthy is None else self.healthy.tolist(),
             "known": asdict(self.known),
             "noise": None if self.noise is None else self.noise.tolist(),
+            "intervals_of_units": None if self.intervals_of_units is None else self.intervals_of_units.to_plain(),
         }
         replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
 
@@ -263,6 +267,7 @@ def _from_plain(plain: Any) -> Identifier:
     noise = None if plain.get("noise") is None else array(plain["noise"], "noise", (6, 6))
     if noise is not None and not (np.allclose(noise, noise.T, atol=0.0) and np.linalg.eigvalsh(noise)[0] > 0.0):
         raise InputError("noise: accepted is a symmetric, positive definite covariance of R and k")
+    of_units = plain.get("intervals_of_units")
     known = plain.get("known", {})
     schema.check(known, dict[str, Any], "known")
     for key in known:
@@ -280,6 +285,7 @@ def _from_plain(plain: Any) -> Identifier:
         healthy,
         Knowledge(**known),
         noise,
+        None if of_units is None else ConformalIntervals.from_plain(of_units),
     )
 
 
@@ -383,7 +389,9 @@ def fit_identifier(
     """Train an estimator and calibrate its intervals on rows that it, or the network of their fold, was not trained on.
 
     Rows whose record gave no features (NaN) are left out. Intervals are calibrated on rows scaled to the nominal unit:
-    what a unit is off by is not the estimator's error, and whoever identifies tells how well it is known.
+    what a unit is off by is not the estimator's error, and whoever identifies tells how well it is known. A biased
+    reconstruction has its bias in a unit's healthy recordings, too: the closed form, which does not learn it, has other
+    intervals with them than without.
 
     Parameters
     ----------
@@ -448,6 +456,13 @@ def fit_identifier(
     if trained is None:
         residuals, variance = residuals_of(identifier, np.arange(len(features)))
         method = "closed form, all rows"
+        if covariance is None and scaled == 6:
+            unbiased = nominal.copy()
+            healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
+            unbiased[:, :scaled] *= nominal_nine(actuator)[:scaled] / healthy
+            left = _estimate(identifier, unbiased) - faults
+            of_units = ConformalIntervals.calibrate(left, None, "closed form, all rows less their bias")
+            identifier = replace(identifier, intervals_of_units=of_units)
     elif intervals == "split":
         residuals, variance = residuals_of(identifier, trained.test_rows)
         method = "split, test rows"
