@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
+from emafault.actuator.sensors import measure
+from emafault.actuator.simulate import simulate
 from emafault.reconstruction import reconstruct
 from emafault.reconstruction.noise import split_noise
 
-from .conftest import ACTUATOR, LEVELS, noisy, recordings
+from .conftest import ACTUATOR, COMMANDS, LEVELS, NOISE, noisy, recordings
 
 SPEED, ANGLE = 0.3, 1e-4  # rad/s, rad
 
@@ -32,9 +36,20 @@ def test_without_noise_there_is_none():
     assert max(split_noise(np.full(1000, 50.0), angle, 2e-4)) < 1e-15
 
 
-@pytest.mark.parametrize(("method", "settings"), [("nine", {"noise": LEVELS}), ("nine", {})])
+@pytest.mark.parametrize(
+    ("method", "settings"), [("nine", {"noise": LEVELS}), ("nine", {}), ("weighted", {"floating": True})]
+)
 def test_what_fits_at_short_intervals_is_not_told_to_miss(method, settings):
     batch = recordings(24, "sine", interval=5e-5, seed=11)
     told = reconstruct(method, noisy(batch), 5e-5, ACTUATOR, settings).extras
-    chance = stats.chi2.sf(told["fit"] * told["freedom"], told["freedom"])
-    assert np.mean(chance < 1e-4) == 0.0 and np.mean(chance < 0.01) < 0.06
+    off = (told["fit"] - 1.0) * np.sqrt(told["freedom"] / 2.0)  # in standard deviations of chance
+    assert np.std(off) < 1.35
+    assert np.mean(stats.chi2.sf(told["fit"] * told["freedom"], told["freedom"]) < 1e-4) == 0.0
+
+
+def test_a_wrong_shape_of_the_back_emf_is_told_at_short_intervals_too():
+    run = make_runs(ACTUATOR, np.zeros((1, 6)), effects={"back_emf_shape": {"h5": 0.005}})
+    clean = simulate(run, command_positions("sine", COMMANDS["sine"], 1.0, 1e-4), 1.0, 5e-5)
+    for settings in ({"floating": True}, {"floating": False}):
+        told = reconstruct("weighted", measure(clean, run, NOISE, 3), 5e-5, ACTUATOR, settings).extras
+        assert np.all(stats.chi2.sf(told["fit"] * told["freedom"], told["freedom"]) < 1e-4)

@@ -6,7 +6,8 @@ measured too: noise in them inflates X^T Omega^-1 X by an amount that is known a
 Measurement Error Models, 1987, section 2.2), without which R would come out low by 1e-4.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +48,22 @@ def whiten(table, variance, linked, coupling):
             for c in range(columns):
                 out[n, c] = table[n, c]
     return out, d, l
+
+
+@compiled
+def misfit(residual, variance, linked, coupling):
+    """Minus twice the log likelihood of a residual (row,) under Omega, a constant apart."""
+    total, product, white, d = 0.0, 1.0, 0.0, 1.0
+    for n in range(len(residual)):
+        l = coupling / d if linked[n] else 0.0
+        d = variance[n] - l * coupling
+        white = residual[n] - l * white
+        total += white * white / d
+        product *= d
+        if product < 1e-200 or product > 1e200:
+            total += np.log(product)
+            product = 1.0
+    return total + np.log(product)
 
 
 @compiled
@@ -135,6 +152,16 @@ class PhaseProblem:
         """Mean square of the residuals at ``beta`` less what the noise levels explain, the voltage's apart (V2)."""
         expected, _ = row_variance(self.rows, self.D @ beta, beta, noise, self.interval)
         return float(np.mean((self.rows.V - self.X @ beta) ** 2 - expected)) + noise.voltage**2
+
+    def left(self, beta: np.ndarray) -> float:
+        """Root mean square of the residuals at ``beta`` (V)."""
+        return float(np.sqrt(np.mean((self.rows.V - self.X @ beta) ** 2)))
+
+    def misfit_of_voltage(self, beta: np.ndarray, noise: NoiseLevels) -> Callable[[float], float]:
+        """Minus twice the log likelihood of the residuals at ``beta``, by the noise of the voltages (V)."""
+        known, coupling = row_variance(self.rows, self.D @ beta, beta, replace(noise, voltage=0.0), self.interval)
+        residual = self.rows.V - self.X @ beta
+        return lambda voltage: misfit(residual, known + voltage**2, self.rows.linked, coupling)
 
     def second_pass(self, beta: np.ndarray, noise: NoiseLevels) -> PhaseFit | None:
         """Estimate with weights at ``beta``, corrected for noisy regressors; None where an unknown is undetermined."""

@@ -10,7 +10,7 @@ near nominal (30 %), and the covariance is widened where residuals exceed what i
 larger then, and at constant speed, where only the ripple tells R from k, several percent.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..actuator.parameters import ActuatorParameters
 from .features import Features, Signals, check_number, read_settings
 from .goodness import by_stretch, stretches
 from .least_squares import CURRENT, DIDT, EMF, INTERCEPT, PhaseFit, PhaseProblem, join_phases
-from .noise import LEAST_VOLTAGE, NoiseLevels, sensor_noise, stated_noise
+from .noise import LEAST_VOLTAGE, NoiseLevels, likeliest_voltage, sensor_noise, stated_noise
 from .rows import Rows, SampleChoice, phase_rows
 
 LOOSE_INDUCTANCE = 0.3  # relative standard deviation of L where di/dt is not measured
@@ -132,8 +132,7 @@ def fit_runs(
             if len(first) < 3:
                 continue
             if estimated:
-                left = float(np.mean([p.excess_variance(beta, noise) for p, beta in first]))
-                noise = replace(noise, voltage=float(np.sqrt(max(left, LEAST_VOLTAGE**2))))
+                noise = replace(noise, voltage=_voltage_noise(first, noise, ends))
             fits = [fit for p, beta in first if (fit := p.second_pass(beta, noise)) is not None]
             if len(fits) < 3:
                 continue
@@ -153,6 +152,17 @@ def fit_runs(
             yield RunFit(run, rows, fits, noise)
 
     return out, fill()
+
+
+def _voltage_noise(first: Sequence[tuple[PhaseProblem, np.ndarray]], noise: NoiseLevels, ends: bool) -> float:
+    """Noise of the voltages (V) by what first estimates leave; beside a ripple not recorded by its mean square."""
+    if not ends:
+        left = float(np.mean([p.excess_variance(beta, noise) for p, beta in first]))
+        return float(np.sqrt(max(left, LEAST_VOLTAGE**2)))
+    misfits = [p.misfit_of_voltage(beta, noise) for p, beta in first]
+    return likeliest_voltage(
+        lambda voltage: sum(misfit(voltage) for misfit in misfits), max(p.left(b) for p, b in first)
+    )
 
 
 def reconstruct_weighted(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
