@@ -96,6 +96,20 @@ def test_a_form_is_found_where_it_is(word, shape, sizes, driver):
         assert first.values["order"] == shape["order"]  # what turns with the rotor
 
 
+SIZES = [(c[0], c[1], c[2], c[3], n) for c in CASES for n in FORMS[c[0]].POSITIVE]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("word", "shape", "sizes", "driver", "size"), SIZES, ids=[f"{c[0]}{c[3]}" for c in SIZES])
+def test_a_size_that_is_known_roughly_is_looked_for_above_zero(word, shape, sizes, driver, size):
+    machine = Machine(word, shape, sizes, driver)
+    first = machine.proposed()[0]
+    wide = tuple((n, v, 1.01 * v if n == size else d, unit) for n, v, d, unit in first.shape)
+    rough = Described(first.id, word, "torque", driver, wide, first.scale, 1.0)
+    found = refined(WithForms(machine, [rough]), rough, machine.found, machine.carried, {}, {})
+    assert found.values[size] > 0.0
+
+
 @pytest.mark.parametrize("parts", [2, 3])
 def test_a_scan_in_parts_finds_what_one_does(parts):
     machine = Machine("order", {"order": 3.27}, (0.15, 0.1))

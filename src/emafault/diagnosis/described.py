@@ -270,6 +270,8 @@ def refined(
     for _ in range(REFINED):
         for k, (name, at, width, unit) in enumerate(form.shape):
             for step in STEPS if width > 0.0 else ():
+                if name in module.POSITIVE and at + step * width <= 0.0:
+                    continue
                 shape = (*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
                 found = value(replace(form, shape=shape))
                 if found > best:

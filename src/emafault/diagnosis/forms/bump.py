@@ -9,6 +9,7 @@ from ..left import Found, Left, Shape, beside_first, of_cells, singly
 AXIS = "angle of the rotor (rad)"  # of its picture
 ALONG = "rotor_angle"
 EACH = False
+POSITIVE = ("width",)
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("depth",)
 CELLS = 36  # of the turn

@@ -10,6 +10,7 @@ from .spectrum import above, refined
 AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "time"
 EACH = True
+POSITIVE = ("frequency",)
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
 PERIODS = 3.0  # fewest in a recording

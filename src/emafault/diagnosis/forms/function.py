@@ -13,6 +13,7 @@ from ..model import Block
 AXIS = "coordinate"  # of its picture
 ALONG = "function"  # the coordinate that its shape names
 EACH = False
+POSITIVE: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ()
 KNOTS = 6
 VALUES = tuple(f"at_{k + 1}" for k in range(KNOTS))

@@ -12,6 +12,7 @@ from ..model import Block
 AXIS = "what has built up"  # of its picture
 ALONG = "time"
 EACH = False
+POSITIVE = ("time_constant",)
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("gain",)
 SOURCES = ("loss", "speed", "start")  # current squared (A2), magnitude of the speed (100 rad/s), one

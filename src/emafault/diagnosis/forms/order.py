@@ -10,6 +10,7 @@ from .spectrum import above, refined
 AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "order"
 EACH = False
+POSITIVE = ("order",)
 CHANNELS: tuple[str, ...] = ("angle",)  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
 CELLS = 64  # a turn

@@ -9,6 +9,7 @@ from ..left import Found, Left, Shape, beside_first, of_cells, singly
 AXIS = "time (s)"  # of its picture
 ALONG = "time"
 EACH = False
+POSITIVE: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("current", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("jump",)
 CELLS = 32
