@@ -29,6 +29,7 @@ _FORMAT = 1
 _KEYS = (
     "format", "estimator", "actuator", "alpha_m", "lag", "intervals", "network", "feature_low", "feature_high",
     "healthy", "known", "noise", "intervals_of_units",
+    "network_of_units",
 )  # fmt: skip
 
 
@@ -54,8 +55,10 @@ class Identifier:
     healthy: np.ndarray | None = None  # R, k (and L) that it takes for healthy at 20 degC; None: the nominal ones
     known: Knowledge = field(default_factory=Knowledge)  # of any unit and its magnets, beforehand
     noise: np.ndarray | None = None  # (6, 6) relative covariance of R and k, of a reconstruction that tells none
-    #: of units with healthy recordings, where these take out a bias that ``intervals`` hold; None: the same
+    #: of units with healthy recordings, where these take out a bias that ``intervals`` hold, and the network that
+    #: weighs nine features as one such recording leaves them known; None: the same
     intervals_of_units: ConformalIntervals | None = None
+    network_of_units: Network | None = None
 
     @property
     def estimator(self) -> str:
@@ -92,7 +95,7 @@ class Identifier:
         InputError : features of the wrong shape, or nine without covariance for the closed form
         """
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        return _estimate(self, features, covariance)
+        return _estimate(self._beside(unit), features, covariance)
 
     def interval(
         self,
@@ -109,12 +112,12 @@ class Identifier:
         so does, without ``unit``, what is not known of any unit.
         """
         untold = covariance is None
-        intervals = self.intervals if unit is None or self.intervals_of_units is None else self.intervals_of_units
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        value, variance = _estimate(self, features, covariance), _variance(self, features, covariance)
+        own = self._beside(unit)
+        value, variance = _estimate(own, features, covariance), _variance(own, features, covariance)
         if untold and variance is not None:  # that of the unit alone
-            variance = variance + intervals.typical_variance
-        half = intervals.half_width(level, variance, len(features))
+            variance = variance + own.intervals.typical_variance
+        half = own.intervals.half_width(level, variance, len(features))
         return value - half, value + half
 
     def estimate(
@@ -168,6 +171,16 @@ class Identifier:
         )
         return np.maximum(beyond.max(axis=1), 0.0)
 
+    def _beside(self, unit: np.ndarray | None) -> "Identifier":
+        """What identifies features of a unit with healthy recordings, or of one without."""
+        if unit is None:
+            return self
+        return replace(
+            self,
+            intervals=self.intervals_of_units or self.intervals,
+            network=self.network_of_units or self.network,
+        )
+
     def _nominal(self, features, covariance, unit, unit_covariance=None) -> tuple[np.ndarray, np.ndarray | None]:
         features = np.atleast_2d(np.asarray(features, float))
         width = len(self.feature_low) if self.feature_low is not None else features.shape[1]
@@ -216,6 +229,7 @@ class Identifier:
             "known": asdict(self.known),
             "noise": None if self.noise is None else self.noise.tolist(),
             "intervals_of_units": None if self.intervals_of_units is None else self.intervals_of_units.to_plain(),
+            "network_of_units": None if self.network_of_units is None else self.network_of_units.to_plain(),
         }
         replace_atomically(Path(folder) / FILE, lambda path: path.write_text(json.dumps(plain)))
 
@@ -268,6 +282,9 @@ def _from_plain(plain: Any) -> Identifier:
     if noise is not None and not (np.allclose(noise, noise.T, atol=0.0) and np.linalg.eigvalsh(noise)[0] > 0.0):
         raise InputError("noise: accepted is a symmetric, positive definite covariance of R and k")
     of_units = plain.get("intervals_of_units")
+    network_of_units = None if plain.get("network_of_units") is None else Network.from_plain(plain["network_of_units"])
+    if network_of_units is not None and (network is None or len(network_of_units.scaler.feature_mean) != inputs):
+        raise InputError("network_of_units: accepted is one that reads what the network does")
     known = plain.get("known", {})
     schema.check(known, dict[str, Any], "known")
     for key in known:
@@ -286,6 +303,7 @@ def _from_plain(plain: Any) -> Identifier:
         Knowledge(**known),
         noise,
         None if of_units is None else ConformalIntervals.from_plain(of_units),
+        network_of_units,
     )
 
 
@@ -391,7 +409,8 @@ def fit_identifier(
     Rows whose record gave no features (NaN) are left out. Intervals are calibrated on rows scaled to the nominal unit:
     what a unit is off by is not the estimator's error, and whoever identifies tells how well it is known. A biased
     reconstruction has its bias in a unit's healthy recordings, too: the closed form, which does not learn it, has other
-    intervals with them than without.
+    intervals with them than without. A network of nine features that learns from units that differ has a second one for
+    units with a healthy recording, for how nine features are best weighed depends on what of the unit is known.
 
     Parameters
     ----------
@@ -447,15 +466,32 @@ def fit_identifier(
         healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
         identifier = replace(identifier, network=trained.network, healthy=healthy)
 
-    def residuals_of(model: Identifier, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        part = None if spread is None else spread[rows]
-        return _estimate(model, nominal[rows], part) - faults[rows], _variance(model, nominal[rows], part)
+    def scored(
+        model: TrainedNetwork, learnt: np.ndarray, shown: np.ndarray, spread: np.ndarray | None, seed: int
+    ) -> ConformalIntervals:
+        """Intervals of a network by rows as ``shown``, of networks that learnt without them."""
+
+        def part(of: TrainedNetwork, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+            own, noise = replace(identifier, network=of.network), None if spread is None else spread[rows]
+            return _estimate(own, shown[rows], noise) - faults[rows], _variance(own, shown[rows], noise)
+
+        if intervals == "split":
+            residuals, variance = part(model, model.test_rows)
+            return ConformalIntervals.calibrate(residuals, variance, "split, test rows")
+        order = np.random.default_rng([seed, 20]).permutation(len(shown))
+        parts = []
+        for fold, left_out in enumerate(np.array_split(order, folds)):
+            rest = np.setdiff1d(order, left_out)
+            parts.append(part(train(learnt[rest], faults[rest], network, training, seed + 1000 * (fold + 1)), left_out))
+        residuals = np.concatenate([p[0] for p in parts])
+        variance = None if spread is None else np.concatenate([v for _, v in parts if v is not None])
+        return ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {folds} folds")
 
     if trained is None and features.shape[1] == 9:
         return Fit(replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features")))
     if trained is None:
-        residuals, variance = residuals_of(identifier, np.arange(len(features)))
-        method = "closed form, all rows"
+        residuals, variance = _estimate(identifier, nominal, spread) - faults, _variance(identifier, nominal, spread)
+        found = ConformalIntervals.calibrate(residuals, variance, "closed form, all rows")
         if covariance is None and scaled == 6:
             unbiased = nominal.copy()
             healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
@@ -463,17 +499,15 @@ def fit_identifier(
             left = _estimate(identifier, unbiased) - faults
             of_units = ConformalIntervals.calibrate(left, None, "closed form, all rows less their bias")
             identifier = replace(identifier, intervals_of_units=of_units)
-    elif intervals == "split":
-        residuals, variance = residuals_of(identifier, trained.test_rows)
-        method = "split, test rows"
-    else:
-        order = np.random.default_rng([seed, 20]).permutation(len(features))
-        parts = []
-        for fold, left_out in enumerate(np.array_split(order, folds)):
-            rest = np.setdiff1d(order, left_out)
-            model = train(learnt[rest], faults[rest], network, training, seed + 1000 * (fold + 1))
-            parts.append(residuals_of(replace(identifier, network=model.network), left_out))
-        residuals = np.concatenate([part[0] for part in parts])
-        variance = None if covariance is None else np.concatenate([v for _, v in parts if v is not None])
-        method = f"cross-conformal, {folds} folds"
-    return Fit(replace(identifier, intervals=ConformalIntervals.calibrate(residuals, variance, method)), trained)
+        return Fit(replace(identifier, intervals=found))
+    found = scored(trained, learnt, nominal, spread, seed)
+    if scaled == 9 and units is not None and spread is not None:
+        # as a healthy recording with the noise of the row's own leaves the unit known
+        draws = np.random.default_rng([seed, 40]).normal(size=nominal.shape)
+        size = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
+        alike = spread / (size[:, :, None] * size[:, None, :]) + LEAST_NOISE * np.eye(9)
+        beside = nominal + size * (np.linalg.cholesky(alike) @ draws[:, :, None])[:, :, 0]
+        other = train(beside, faults, network, training, seed)
+        of_units = scored(other, beside, beside, 2.0 * spread, seed)
+        identifier = replace(identifier, intervals_of_units=of_units, network_of_units=other.network)
+    return Fit(replace(identifier, intervals=found), trained)
