@@ -5,8 +5,8 @@
 Prints a table in Markdown: mean absolute errors of dT (K), N and xi on fresh runs, the same over the bound of the
 recordings (with the rate of heating unknown where the method has it so) and over that of six features with
 floating-phase samples, of calibrated units over those with their healthy recordings; then the rows whose intervals
-cover less or more than they should and those below the bound by more than chance. What an experiment needs to be
-evaluated is `snakemake --cores all --config experiment=NAME`; several_recordings is a target of its own.
+cover less or more than they should, by chance or not, and those below the bound by more than chance. What an experiment
+needs to be evaluated is `snakemake --cores all --config experiment=NAME`; several_recordings is a target of its own.
 """
 
 import argparse

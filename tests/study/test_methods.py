@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -63,9 +64,11 @@ def test_both_bounds_stand_beside_every_error(results):
         "`study/turning` | weighted, closed form | 0 | 1000 | 0.500, 0.00100, 0.00200 | none holds | none holds |",
         "first, 4` | six features, closed form together | 0 | 40 | 0.200, 0.00100, 0.00100 | 2.00, 2.00, 2.00 |",
         "6 of 7 rows cover as they should",
-        "first: nine heating, closed form covers 0.950",
+        "first: nine heating, closed form covers 0.950, by more than chance (0.028, 1000 runs)",
     ):
         assert row in text
+    few = [replace(row, runs=200) for row in rows_of(results)]
+    assert "covers 0.950, no more than by chance (0.064, 200 runs)" in "\n".join(markdown(few))
     below = [line.strip() for line in text.splitlines() if "below" in line]
     assert below == ["first: nine, closed form is below its bound in dT"]
 

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..plain import read_json
 from .bound import CALIBRATED
 
-LOWEST = 3.0  # standard errors below a bound that are not chance
+LOWEST = 3.0  # standard errors below a bound, or of a coverage, that are not chance
 COVER = {0.9: (0.88, 0.92)}  # level of the intervals -> accepted coverage
 SEVERAL = "several_recordings"
 #: output -> digits that are shown of it
@@ -37,6 +37,12 @@ class Row:
         """Whether the coverage is accepted; of a level without a range of its own always."""
         low, high = COVER.get(self.level, (0.0, 1.0))
         return low <= round(self.coverage, 3) <= high
+
+    @property
+    def chance(self) -> float:
+        """By how much the coverage of intervals that hold is off by chance at most, as if a run's components went
+        together; intervals that were scored on few runs are off by more."""
+        return LOWEST * float(np.sqrt(self.level * (1.0 - self.level) / self.runs))
 
     @property
     def below(self) -> list[str]:
@@ -134,7 +140,12 @@ def markdown(rows: Sequence[Row]) -> list[str]:
         before = row.experiment
     held = [row for row in rows if row.covers]
     lines += ["", f"{len(held)} of {len(rows)} rows cover as they should"]
-    lines += [f"    {r.experiment}: {r.method} covers {r.coverage:.3f}" for r in rows if not r.covers]
+    for r in rows:
+        if not r.covers:
+            by = "by more than chance" if abs(r.coverage - r.level) > r.chance else "no more than by chance"
+            lines.append(
+                f"    {r.experiment}: {r.method} covers {r.coverage:.3f}, {by} ({r.chance:.3f}, {r.runs} runs)"
+            )
     lines += [f"    {r.experiment}: {r.method} is below its bound in {', '.join(r.below)}" for r in rows if r.below]
     return lines
 
