@@ -5,6 +5,7 @@ on the rung that leaves an effect out, which one the library lacks; one that is 
 """
 
 import json
+import shutil
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -69,29 +70,26 @@ def run_cases(
             wanted[folder / "oracles" / cases[0].name / "diagnosis.json"] = cases[0], others
         keys = {c.name: folder / "keys" / f"{c.name}.json" for c in cases}
         missing = [path for path in wanted if not path.exists()]
-        if not missing and all(key.exists() for key in keys.values()):
-            continue
         benches = {c.bench: folder / "benches" / c.bench for c in cases}
-        for case in cases:
-            if not benches[case.bench].exists():
-                keys[case.name].unlink(missing_ok=True)
-        make_cases(rung, [seed], folder, actuator, noise, seed in rivals, population)
-        for case in cases:
-            if case.left_out:
-                write_key_without(keys[cases[0].name], keys[case.name])
-        for path in missing:
-            case, exclude = wanted[path]
-            try:
-                verdict = diagnose_bench(benches[case.bench], actuator, noise, exclude, population.tolerances)
-            except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
-                verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
-            text = to_json(verdict | {"bench": case.name})
-            write_text(path, text)
-        for bench in benches.values():
-            if not keep_benches:
-                for file in bench.glob("*.nc"):
-                    file.unlink()
-                bench.rmdir()
+        if missing or not all(key.exists() for key in keys.values()):
+            for case in cases:
+                if not benches[case.bench].exists():
+                    keys[case.name].unlink(missing_ok=True)
+            make_cases(rung, [seed], folder, actuator, noise, seed in rivals, population)
+            for case in cases:
+                if case.left_out:
+                    write_key_without(keys[cases[0].name], keys[case.name])
+            for path in missing:
+                case, exclude = wanted[path]
+                try:
+                    verdict = diagnose_bench(benches[case.bench], actuator, noise, exclude, population.tolerances)
+                except FAILURES as error:  # counts as a wrong answer, and must not take the whole draw with it
+                    verdict = {"verdict": "failed", "which": [], "error": f"{type(error).__name__}: {error}"}
+                text = to_json(verdict | {"bench": case.name})
+                write_text(path, text)
+        if not keep_benches:  # those too that a killed job had diagnosed and not yet removed
+            for bench in benches.values():
+                shutil.rmtree(bench, ignore_errors=True)
     return names
 
 
