@@ -1,9 +1,11 @@
-"""Files written whole or not at all."""
+"""Files and folders written whole or not at all."""
 
 import contextlib
+import errno
 import glob
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import InputError, shown
@@ -43,7 +45,48 @@ def _remove_abandoned(path: Path) -> None:
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         process = part.suffixes[-2].removeprefix(".")
         if process.isdigit() and not Path(f"/proc/{process}").exists():
-            part.unlink(missing_ok=True)
+            if part.is_dir():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A folder to write into, which takes the place of ``path`` once all is written.
+
+    A job may outlive its killed run, and the next run removes what it finds: of files written one after the other those
+    before that moment would be missing from a folder that counts as finished.
+
+    Raises
+    ------
+    InputError : a link, a device or a file stands there, or the folder cannot be written
+    """
+    if path.is_symlink() or (path.exists() and not path.is_dir()):
+        raise InputError(f"{shown(path)}: is no folder, accepted is a folder or nothing")
+    temporary, old = (path.with_name(f".{path.name}{word}.{os.getpid()}.part") for word in ("", ".old"))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(path)
+        temporary.mkdir()
+        yield temporary
+        while True:
+            with contextlib.suppress(FileNotFoundError):
+                os.replace(path, old)
+            try:
+                os.replace(temporary, path)
+                break
+            except OSError as error:  # another process was faster, with the same
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+                shutil.rmtree(old, ignore_errors=True)
+    except InputError as error:
+        raise InputError(str(error).replace(temporary.name, path.name)) from error
+    except OSError as error:
+        raise InputError(f"{shown(path)}: cannot be written ({error.strerror or error})") from error
+    finally:
+        for left in (temporary, old):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def write_text(path: str | Path, text: str) -> None:

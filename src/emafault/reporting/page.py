@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..io.atomic import replace_atomically, write_text
+from ..io.atomic import whole_folder, write_text
 from . import panels as charts
 
 STYLE = Path(__file__).with_name("page.css")
@@ -16,7 +16,7 @@ CONTENTS = 3  # headings from which on a page has a bar of contents
 
 
 class Page:
-    """Parts in the order in which they are added; figures are kept as PNG beside the page as well, if asked."""
+    """Parts in the order in which they are added; figures are kept as PNG in a folder of their own too, if asked."""
 
     def __init__(self, title: str, figures: str | Path | None = None) -> None:
         self.title = title
@@ -24,6 +24,7 @@ class Page:
         self.parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
         self.headings: dict[str, str] = {}  # by id
         self.charts = False
+        self.images: dict[str, bytes] = {}  # PNG by file name
 
     def heading(self, text: str, level: int = 2) -> None:
         """A section's heading; the bar of contents leads to those of level 2."""
@@ -89,8 +90,7 @@ class Page:
         drawing.savefig(buffer, format="png", dpi=130)
         plt.close(drawing)
         data = buffer.getvalue()
-        if self.folder:
-            replace_atomically(self.folder / f"{name}.png", lambda temporary: temporary.write_bytes(data))
+        self.images[f"{name}.png"] = data
         image = base64.b64encode(data).decode()
         text = html.escape(caption)
         alternative = html.escape(result or caption)
@@ -98,12 +98,16 @@ class Page:
         self.parts.append(f'<figure id="{name}">{picture}<figcaption>{text}</figcaption></figure>')
 
     def write(self, path: str | Path) -> None:
-        """Write the page, whole or not at all.
+        """Write the folder of figures and the page, each whole or not at all.
 
         Raises
         ------
-        InputError : the file cannot be written
+        InputError : one of them cannot be written
         """
+        if self.folder:
+            with whole_folder(self.folder) as folder:
+                for name, data in self.images.items():
+                    (folder / name).write_bytes(data)
         style = STYLE.read_text() + (charts.styles() if self.charts else "")
         view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
         head = f'<meta charset="utf-8">{view}<title>{html.escape(self.title)}</title><style>{style}</style>'

@@ -15,7 +15,7 @@ from ..identification.evaluation import fault_range
 from ..identification.identifier import Fit, fit_identifier
 from ..identification.posterior import Knowledge
 from ..identification.search import SearchSettings, Trial, choose, finished, ranked, run_worker
-from ..io.atomic import write_text
+from ..io.atomic import whole_folder, write_text
 from ..plain import read_json
 from ..progress import progress, say
 from .features import FeatureTable, read_features
@@ -73,7 +73,7 @@ def train_identifier(
     Parameters
     ----------
     estimator : ``closed_form``, ``network`` (as configured) or ``searched`` (as ``chosen`` by the search)
-    history : written last; learning curves of every seed
+    history : learning curves of every seed; its folder is written whole, and what was in it is removed
 
     Raises
     ------
@@ -87,16 +87,16 @@ def train_identifier(
         settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
     folder, curves = Path(history).parent, []
     seeds = range(1 if estimator == "closed_form" else settings["seeds"])
-    for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
-        kind = "closed_form" if estimator == "closed_form" else "network"
-        fit = _fit(kind, table, units, settings, seed)
-        fit.identifier.save(seed_folder(folder, seed))
-        if fit.trained:
-            curves.append([asdict(curve) for curve in fit.trained.curves])
-    plain = {key: settings.get(key) for key in ("network", "training")}
-    write_json(
-        history, {"estimator": estimator, "seeds": len(seeds), "rows": len(table.faults), "curves": curves, **plain}
-    )
+    with whole_folder(folder) as part:
+        for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
+            kind = "closed_form" if estimator == "closed_form" else "network"
+            fit = _fit(kind, table, units, settings, seed)
+            fit.identifier.save(seed_folder(part, seed))
+            if fit.trained:
+                curves.append([asdict(curve) for curve in fit.trained.curves])
+        plain = {key: settings.get(key) for key in ("network", "training")}
+        told = {"estimator": estimator, "seeds": len(seeds), "rows": len(table.faults), "curves": curves, **plain}
+        write_json(part / Path(history).name, told)
 
 
 def search_settings(spec: Mapping[str, Any]) -> SearchSettings:
