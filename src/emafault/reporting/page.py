@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..io.atomic import whole_folder, write_text
+from ..io.atomic import replace_atomically, whole_folder, write_text
 from . import panels as charts
 
 STYLE = Path(__file__).with_name("page.css")
@@ -107,7 +107,7 @@ class Page:
         if self.folder:
             with whole_folder(self.folder) as folder:
                 for name, data in self.images.items():
-                    (folder / name).write_bytes(data)
+                    replace_atomically(folder / name, lambda path, data=data: path.write_bytes(data))
         style = STYLE.read_text() + (charts.styles() if self.charts else "")
         view = '<meta name="viewport" content="width=device-width, initial-scale=1">'
         head = f'<meta charset="utf-8">{view}<title>{html.escape(self.title)}</title><style>{style}</style>'
