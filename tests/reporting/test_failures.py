@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from emafault.errors import InputError
 from emafault.reporting import failures
 
 STATUS = "    message: SLURM-job '6' failed, SLURM status is: '{}'. Detailed failure reason unavailable\n"
@@ -29,6 +30,11 @@ def _said(log, jobid="0", numbers=("5", "6")):
         (None, "TIMEOUT", "time limit at 40 min"),
         (None, "NODE_FAIL", "node failure"),
         ("*** JOB 6 ON n1 CANCELLED AT 2026-11-26T10:31:39 ***", "CANCELLED", "cancelled"),
+        (
+            "*** JOB 6 ON n1 CANCELLED AT 2026-11-26T10:31:39 DUE TO JOB REQUEUE ***",
+            "FAILED",
+            "failed as Slurm's job 6",
+        ),
         ("emafault: a.nc: cannot be written (No space left)", "FAILED", "a.nc: cannot be written (No space left)"),
         ("Segmentation fault", "FAILED", "failed as Slurm's job 6"),
     ],
@@ -61,5 +67,19 @@ def test_a_group_names_its_rules(tmp_path):
     assert line.startswith("emafault: reconstruct_features, simulate_shard: time limit at 80 min, after 2 attempts")
 
 
+def test_a_group_that_is_refused_is_not_told_as_it_ended_before(tmp_path):
+    group = SimpleNamespace(jobid="a-b", attempt=2, resources={}, is_group=lambda: True, jobs=[_job()])
+    (tmp_path / "5.log").write_text("Exceeded job memory limit")
+    [line] = failures.lines([group], _said(tmp_path / "5.log", "a-b", numbers=("5",)))
+    assert line.startswith("emafault: simulate_shard: refused by Slurm, after 2 attempts")
+
+
 def test_jobs_that_ran_here_have_said_it_themselves(tmp_path):
     assert failures.lines([_job()], failures.logged([str(tmp_path / "none")])) == []
+
+
+def test_a_job_is_begun_again_so_often_and_no_more():
+    failures.refuse_restart({})
+    failures.refuse_restart({"SLURM_RESTART_COUNT": str(failures.RESTARTS)})
+    with pytest.raises(InputError, match="begun again by Slurm 4 times"):
+        failures.refuse_restart({"SLURM_RESTART_COUNT": str(failures.RESTARTS + 1)})

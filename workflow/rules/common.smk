@@ -19,6 +19,8 @@ KEPT = (
 )
 
 try:
+    if workflow.remote_exec:
+        failures.refuse_restart(os.environ)
     configuration.check_call(config)
     PLAN = configuration.plan(config.get("experiment", "paper"), config.get("overrides", ""))
     refuse_folder(KEPT)

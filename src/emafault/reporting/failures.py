@@ -1,20 +1,22 @@
 """Why Slurm ended a job for good, in a line that names its rule."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import one_line, shown
+from ..errors import InputError, one_line, shown
 
+#: how often Slurm may begin a job again, which takes no attempt
+RESTARTS = 3
 #: what Slurm writes into the log of a job that it ends, and what that means
 _SAID = {
     r"oom[-_ ]kill|exceeded (job |step )?memory limit|Exceeded job memory": "out of memory",
     r"DUE TO TIME LIMIT": "time limit",
     r"DUE TO NODE FAILURE": "node failure",
     r"DUE TO PREEMPTION": "preempted",
-    r"JOB \S+ ON \S+ CANCELLED AT": "cancelled",
+    r"JOB \S+ ON \S+ CANCELLED AT (?!.*DUE TO JOB REQUEUE)": "cancelled",
 }
 _STATES = {
     "TIMEOUT": "time limit",
@@ -36,6 +38,19 @@ def lines(jobs: Iterable[Any], said: str) -> list[str]:
     return [line for job in sorted(jobs, key=lambda job: str(job.jobid)) for line in _line(job, said)]
 
 
+def refuse_restart(environment: Mapping[str, str]) -> None:
+    """Refuse a job that Slurm has begun again too often: what kills it each time, its node or itself, is not told to
+    Snakemake, whose next attempt asks for more.
+
+    Raises
+    ------
+    InputError : saying how often
+    """
+    restarts = environment.get("SLURM_RESTART_COUNT", "")
+    if restarts.isdecimal() and int(restarts) > RESTARTS:
+        raise InputError(f"begun again by Slurm {restarts} times")
+
+
 def logged(files: Iterable[str]) -> str:
     """What Snakemake's log files say."""
     texts = []
@@ -47,7 +62,8 @@ def logged(files: Iterable[str]) -> str:
 
 def _line(job: Any, said: str) -> list[str]:
     submitted = re.findall(rf"^Job {job.jobid} has been submitted with SLURM jobid (\S+) \(log: (.*)\)\.$", said, re.M)
-    refused = len(submitted) < job.attempt and "SLURM sbatch failed" in said
+    # what sbatch says of a group Snakemake does not pass on
+    refused = len(submitted) < job.attempt and ("SLURM" if job.is_group() else "SLURM sbatch failed") in said
     if not submitted and not refused:
         return []
     number, log = submitted[-1] if submitted else ("", "")
