@@ -79,6 +79,18 @@ def test_conformal_rank_and_refusals():
         ConformalIntervals.calibrate(residuals[:5], None, "")
 
 
+def test_intervals_are_as_wide_as_a_network_that_is_worse_than_its_folds():
+    rng = np.random.default_rng(4)
+    folds, own, new = rng.normal(size=(600, 6)), rng.normal(size=(90, 6)), rng.normal(size=(4000, 6))
+    off = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.5])  # of the network's errors over those of its folds
+    plain = ConformalIntervals.calibrate(folds, None, "cross")
+    told = plain.of_a_worse(own * off, folds)
+    inside = np.mean(np.abs(new * off) <= told.half_width(0.9, None, 1), axis=0)
+    assert np.all(np.abs(inside - 0.9) < 0.04)
+    assert np.mean(np.abs(new * off) <= plain.half_width(0.9, None, 1), axis=0)[5] < 0.77
+    assert np.array_equal(told.scores[:, :5], plain.scores[:, :5])  # what differs by chance stays
+
+
 @pytest.mark.parametrize("estimator", ["network", "closed_form"])
 def test_saved_and_loaded_gives_the_same_numbers(fitted, fresh, tmp_path, estimator):
     identifier = fitted[estimator].identifier

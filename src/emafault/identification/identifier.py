@@ -485,7 +485,8 @@ def fit_identifier(
             parts.append(part(train(learnt[rest], faults[rest], network, training, seed + 1000 * (fold + 1)), left_out))
         residuals = np.concatenate([p[0] for p in parts])
         variance = None if spread is None else np.concatenate([v for _, v in parts if v is not None])
-        return ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {folds} folds")
+        found = ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {folds} folds")
+        return found.of_a_worse(part(model, model.test_rows)[0], residuals) if len(model.test_rows) else found
 
     if trained is None and features.shape[1] == 9:
         return Fit(replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features")))

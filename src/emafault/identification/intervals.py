@@ -7,10 +7,10 @@ from cross-conformal folds, each predicted by a network trained without it (Vovk
 doi:10.1007/s10472-013-9368-4), or from a held-out split. A half width is the ceil((n + 1) level)-th smallest score
 times the scale, about the prediction of the network trained on all parts. For ``split`` coverage is at least the
 level on average over exchangeable rows; for ``cross`` that is approximate, slightly wide since fold networks see
-fewer rows.
+fewer rows, and too narrow where the network has ended in a worse optimum than theirs: its own test rows tell.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..errors import InputError, shown
 from ..faults import FAULT_NAMES
 from ..plain import array
 
+WORSE = 3.0  # standard errors, from which a network errs more than those of its folds by no chance
 GAUSSIAN_ROWS = 2_000  # quantiles that stand for a Gaussian
 
 
@@ -42,6 +43,15 @@ class ConformalIntervals:
         missed = np.maximum(square - variance.mean(axis=0), 0.0) + 1e-24
         scores = np.sort(np.abs(residuals) / np.sqrt(variance + missed), axis=0)
         return cls(method, scores, missed, np.median(variance, axis=0))
+
+    def of_a_worse(self, own: np.ndarray, of_folds: np.ndarray) -> "ConformalIntervals":
+        """As wide as a network's ``own`` residuals on its test rows ask for where ``of_folds`` are less by no chance.
+
+        Both (row, output). An output whose errors the folds stand for keeps its scores.
+        """
+        ratio = np.sqrt(np.mean(own**2, axis=0) / np.maximum(np.mean(of_folds**2, axis=0), 1e-300))
+        spread = np.sqrt(0.5 / len(own) + 0.5 / len(of_folds))  # of a ratio of root mean squares
+        return replace(self, scores=self.scores * np.where(ratio > 1.0 + WORSE * spread, ratio, 1.0))
 
     @classmethod
     def gaussian(cls, method: str) -> "ConformalIntervals":
