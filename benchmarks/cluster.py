@@ -1,6 +1,6 @@
 """The workflow on a Slurm of two nodes on this machine: the same bits as here, and what becomes of jobs that fail.
 
-    python benchmarks/cluster.py [--log FILE] [results scancel drain down time memory refused]
+    python benchmarks/cluster.py [--log FILE] [results grouped scancel drain down requeued time memory refused]
 
 Needs root, ``apt-get install slurm-wlm munge`` and ``pip install ".[slurm]"``. The nodes have two cores each and no
 accounting. Prints a line for each thing that was tried; exit code 1 where one does not hold.
@@ -9,12 +9,14 @@ accounting. Prints a line for each thing that was tried; exit code 1 where one d
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from emafault.reporting.failures import RESTARTS
 from house import SMALL, build, environment
 from house import snakemake as local
 from kills import of_the_study, plain
@@ -25,6 +27,8 @@ PROFILE = ("--profile", "profiles/slurm", "--slurm-no-account", "--slurm-status-
 SLOW = (
     "overrides=search=none sampling.runs=60 evaluation.seeds=13 training=adam training.epochs=300 training.max_fail=300"
 )
+# as many shards as a study of 8000 runs has
+MANY = (*SMALL[:2], f"{SMALL[2]} sampling.shards=8")
 SHARD = "results/datasets/smoke/{}/shard_0.nc"
 LOG = Path(os.devnull)
 STARTED: list[subprocess.Popen] = []
@@ -61,7 +65,7 @@ def running_job(nodes: dict[str, str], rule: str, but: str = "", within: float =
     while time.monotonic() < deadline:
         for line in slurm(nodes, "squeue", "-h", "-t", "R", "-o", "%i %N %k").splitlines():
             number, node, comment = line.split(maxsplit=2)
-            if comment.startswith(f"rule_{rule}") and number != but:
+            if re.match(rf"rule_(\w+_)?{rule}", comment) and number != but:  # alone or in a group
                 return number, node
         time.sleep(0.1)
     raise SystemExit("no job begins to run")
@@ -88,6 +92,28 @@ def try_results(house: Path, nodes: dict[str, str]) -> str:
     assert not different, f"differ: {different}"
     jobs = len(re.findall(r"has been submitted with SLURM jobid", said))
     return f"{len(got)} files the same bits, {jobs} jobs, {time.monotonic() - start:.0f} s"
+
+
+def try_grouped(house: Path, nodes: dict[str, str]) -> str:
+    """The profile's grouping of short jobs, beside none: as many results, fewer of Slurm's jobs."""
+    found, told = [], []
+    profile = house / "profiles" / "slurm" / "config.yaml"
+    grouped = profile.read_text()
+    for text, word in ((re.sub(r"^group.*\n( .*\n)*", "", grouped, flags=re.M), "each alone"), (grouped, "grouped")):
+        profile.write_text(text)
+        shutil.rmtree(house / "results", ignore_errors=True)
+        start = time.monotonic()
+        code, said = ended(house, run(house, nodes, *MANY))
+        assert code == 0, said[-3000:]
+        took = time.monotonic() - start
+        found.append(results(house))
+        jobs = len(re.findall(r"has been submitted with SLURM jobid", said))
+        assert "group_" in said if word == "grouped" else "group_" not in said, f"{word}: {said[-3000:]}"
+        told.append(f"{word} {jobs} jobs, {took:.0f} s")
+    alone, together = found
+    different = [n for n in alone | together if alone.get(n) != together.get(n)]
+    assert not different, f"differ: {different}"
+    return f"{'; '.join(told)}; {len(together)} files the same bits"
 
 
 def try_scancel(house: Path, nodes: dict[str, str]) -> str:
@@ -131,6 +157,30 @@ def _moved(house: Path, nodes: dict[str, str], state: str, *job: str) -> str:
     return f"{node} in state {state}, its job begun again by Slurm on {after[0]}"
 
 
+def try_requeued(house: Path, nodes: dict[str, str]) -> str:
+    """A job that Slurm begins again too often is ended, and takes an attempt."""
+    process = run(house, nodes, SHARD.format("fresh"), *SMALL, "--forcerun", "simulate_shard")
+    first, _ = running_job(nodes, "simulate_shard")
+    for begun in range(RESTARTS + 1):
+        _begun_again(nodes, first, begun)
+        slurm(nodes, "scontrol", "requeue", first)
+    code, said = ended(house, process)
+    assert code == 0 and said.count("Trying to restart") == 1, said[-3000:]
+    line = re.findall(r"begun again by Slurm \d+ times", said)
+    assert line == [f"begun again by Slurm {RESTARTS + 1} times"], said[-3000:]
+    return f"done by a second attempt after {line[0]}"
+
+
+def _begun_again(nodes: dict[str, str], number: str, times: int, within: float = 120.0) -> None:
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        told = slurm(nodes, "scontrol", "show", "job", number)
+        if f"Restarts={times} " in told and "JobState=RUNNING" in told:
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"job {number} does not begin again:\n{told}")
+
+
 def try_time(house: Path, nodes: dict[str, str]) -> str:
     """A job that takes longer than its limit gets more; where that is too little again, a line says so."""
     slow = (*SMALL[:2], SLOW)
@@ -157,7 +207,7 @@ def _short_of(
     assert code == 0 and said.count("Trying to restart") == 1 and "emafault: " not in said, said[-3000:]
     # what was not set here has doubled by the rule's own count of attempts; a failed job's log repeats what it had
     other = "mem_mb" if unit == "min" else "runtime"
-    asked = re.findall(rf"^rule {rule}:$.*?{other}=(\d+)", said, re.M | re.S)
+    asked = re.findall(rf"^ *rule {rule}:$.*?{other}=(\d+)", said, re.M | re.S)
     assert asked and int(asked[-1]) == 2 * int(asked[0]), asked
     return f"done with {enough} {unit} after {few}; with {few} twice\n  {line}"
 

@@ -1,11 +1,11 @@
 """Commands killed at random moments and run again: nothing is lost, nothing is left over, results are the same bits.
 
-    python benchmarks/kills.py [study diagnosis import calibration] [--kills 50] [--seed 0]
+    python benchmarks/kills.py [study diagnosis import identification calibration] [--kills 50] [--seed 0]
 
 Each command is started in a copy of the project, killed, started again where it was and killed again, until it gets
 to its end, then from the beginning, until it was killed so often: by turns with SIGKILL and SIGTERM, the whole group
-of processes or the one that was started alone. The calibration is ``identify --reference``, with the study's results.
-Prints a table in Markdown.
+of processes or the one that was started alone. The identification is ``identify --reference``, with the study's
+results; the calibration is ``snakemake calibration`` on four cases. Prints a table in Markdown.
 """
 
 import argparse
@@ -26,7 +26,13 @@ from pathlib import Path
 from diagnosis import Case, simulate_bench
 from house import NOT_RESULTS, ROOT, build, environment, snakemake
 
-SMOKE = ("--config", "experiment=smoke", "overrides=search.workers=1")
+#: every stage, small; one worker, so that the search is the same one each time
+STUDY = (
+    "--config",
+    "experiment=smoke",
+    "overrides=search.workers=1 search.trials=3 sampling.runs=60 evaluation.seeds=1 training.epochs=30",
+)
+CASES = "cases: {T0: 4, T1: 0, T2: 0}\nfirst_seed: 40000\nbatch: {T0: 2, T1: 1, T2: 1}\nmeasured: false\n"
 #: who is killed, and how
 KILLS = [(kind, whole) for kind in (signal.SIGKILL, signal.SIGTERM) for whole in (True, False)]
 GONE_WITHIN = 300.0  # s that a job which outlives its killed study may take to end
@@ -63,7 +69,9 @@ class Target:
 
 
 def plain(path: Path) -> bytes:
-    """What a file holds; of trials without how long they took and how they are numbered."""
+    """What a file holds; of trials and cases without how long they took, of trials without their numbers."""
+    if path.name == "calibration.json":
+        return json.dumps({k: v for k, v in json.loads(path.read_text()).items() if k != "seconds"}).encode()
     if path.name not in ("trials.json", "chosen.json"):
         return path.read_bytes()
     read = json.loads(path.read_text())
@@ -73,7 +81,7 @@ def plain(path: Path) -> bytes:
 
 def of_the_study(path: Path) -> bool:
     """Whether a file is a result of the study that holds neither times nor numbers of runs."""
-    hold_times = ("tracked.json", "tracking.json", "journal.log", "report.html", "search.png", "mlflow.db")
+    hold_times = ("tracked.json", "tracking.json", "journal.log", "report.html", "search.png", "mlflow.db", "pace.json")
     aside = path.name.startswith((".", "worker_")) or path.name in hold_times
     return not aside and not set(NOT_RESULTS) & set(path.parts)
 
@@ -85,14 +93,16 @@ def targets(folder: Path, names: list[str]) -> dict[str, Target]:
     bench, healthy = house / "bench", house / "healthy"
     simulate_bench(bench, Case(3, 1.0, ("effects.cogging.a=0.01",)))
     simulate_bench(healthy, Case(1, 1.0))
+    (house / "conf" / "withheld" / "own.yaml").write_text(CASES)
     given = measured(house / "measured")
     every = {
-        "study": Target(snakemake(*SMOKE), house, house / "results", of_the_study, 0.3),
+        "study": Target(snakemake(*STUDY), house, house / "results", of_the_study, 0.3),
         "diagnosis": Target([*emafault, "diagnose", "bench", "--out", "diagnosed"], house, house / "diagnosed"),
         "import": Target(
             [*emafault, "import", "--map", str(given), "--out", "imported", "--force"], house, house / "imported"
         ),
-        "calibration": Target(
+        "calibration": Target(snakemake("calibration"), house, house / "results", of_the_study, 0.6),
+        "identification": Target(
             [
                 *emafault,
                 "identify",
@@ -223,17 +233,17 @@ def bombard(target: Target, kills: int, rng: random.Random) -> dict[str, float]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    names = ["study", "diagnosis", "import", "calibration"]
+    names = ["study", "diagnosis", "import", "identification", "calibration"]
     parser.add_argument("targets", nargs="*", default=names, help=f"any of {', '.join(names)}")
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         made = targets(Path(name), names)
-        if "calibration" in args.targets and "study" not in args.targets:
+        if "identification" in args.targets and "study" not in args.targets:
             finished(made["study"])
         print("| command | takes (s) | kills | runs to the end, all the same bits |\n|---|---|---|---|", flush=True)
-        for target in args.targets:
+        for target in sorted(args.targets, key=names.index):  # the identification has the study's results
             found = bombard(made[target], args.kills, random.Random(args.seed))
             print(f"| {target} | {found['takes']:.1f} | {found['kills']} | {found['ends']} |", flush=True)
 
