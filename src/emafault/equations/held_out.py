@@ -85,12 +85,12 @@ def held_to_account(
         ratio = account.ratio(effect)
         ratios |= dict.fromkeys(told, ratio)
         explored_odds = _log_odds(fit.models, told)
-        odds = (_log_prior_odds(whole, models, effect) if incomplete else explored_odds) + ratio
+        odds = (_log_prior_odds(whole, _leading(models, effect), effect) if incomplete else explored_odds) + ratio
         decides = incomplete or ratio < -CLEAR or odds < 0.0
         # of what the explored recordings have no columns they say nothing
         if np.isfinite(explored_odds) and decides and odds < _log_odds(models, told):
             models += _moved(whole, models, effect, ratio < -CLEAR, _log_mass(models, told) - odds)
-        leading = max((m for m in models if effect in m.units), key=lambda m: m.log_posterior)
+        leading = _leading(models, effect)
         models += _dispersed(every, whole, models, leading, effect, told)
         change = log_odds_of_change(every, whole, leading, effect)
         changes |= dict.fromkeys(told, change)
@@ -99,7 +99,7 @@ def held_to_account(
 
     for form in _untold(models, ratios, lambda u: whole.search.units[u].kind == "form"):
         ratios[form] = account.ratio(form)
-        leading = max((m for m in models if form in m.units), key=lambda m: m.log_posterior)
+        leading = _leading(models, form)
         models += _dispersed(every, whole, models, leading, form, (form,))
         if ratios[form] < CLEAR:
             left = _less(whole, leading, form, True).log_posterior > _less(whole, leading, form, False).log_posterior
@@ -207,7 +207,7 @@ def _dispersed(
     if dispersion == 1.0:
         return []
     gain = leading.log_likelihood - whole.search.less(leading, unit).log_likelihood
-    prior = _log_prior_odds(whole, [leading], unit)
+    prior = _log_prior_odds(whole, leading, unit)
     if len(told) == 1:
         gain = min(gain, _log_odds(models, told) - prior)
     return _moved(whole, models, unit, False, _log_mass(models, told) - (prior + max(gain, 0.0) / dispersion))
@@ -286,12 +286,15 @@ def _occam(ladder: Ladder, whites: Sequence[White], model: Model, fit: Fit) -> f
     return found
 
 
-def _log_prior_odds(whole: Fit, models: Sequence[Model], unit: str) -> float:
-    """Log prior odds of the likeliest set with a unit over the same without it."""
-    leading = max((m for m in models if unit in m.units), key=lambda m: m.log_posterior)
-    members = [(c.unit, c.variant) for c in leading.choices]
-    log_prior = whole.search.log_prior
-    return float(log_prior(members) - log_prior([m for m in members if m[0] != unit]))
+def _leading(models: Sequence[Model], unit: str) -> Model:
+    """The likeliest set with a unit."""
+    return max((m for m in models if unit in m.units), key=lambda m: m.log_posterior)
+
+
+def _log_prior_odds(whole: Fit, model: Model, unit: str) -> float:
+    """Log prior odds of a set with a unit over the same without it."""
+    members = [(c.unit, c.variant) for c in model.choices]
+    return whole.search.log_prior(members) - whole.search.log_prior([m for m in members if m[0] != unit])
 
 
 def _log_odds(models: Sequence[Model], units: Collection[str]) -> float:
