@@ -90,6 +90,24 @@ def test_runs_without_end_currents_have_no_period():
     recording = replace(recorded("parabolic", interval=5e-5), phase_current_end=None)
     machine = machine_of({"a.nc": recording})
     state = State(machine.recordings["a.nc"], Point(truth(machine, recording), "a.nc", ()))
-    _, lengths, _ = electrical._runs(state, 0)
+    runs = electrical._runs(state, 0)
+    lengths = runs.lengths[~runs.crosses]
     _, often = np.unique(lengths, return_counts=True)
     assert often.max() < 0.25 * len(lengths)
+
+
+@pytest.mark.parametrize(("command", "interval", "scale"), [("sine", 1e-4, 0.85), ("parabolic", 4e-4, 1.1)])
+def test_commutations_tell_the_inductance_without_end_currents(command, interval, scale):
+    """A phase that is off has no current: what it has once it is on is a change that the ripple does not hide."""
+    effects = {"inductance_tolerance": {"L_scale": scale}}
+    recording = replace(recorded(command, effects=effects, interval=interval), phase_current_end=None)
+    machine = machine_of({"a.nc": recording})
+    at = {n: v for n, v in truth(machine, recording, effects).items() if n in machine.parameters}
+    L = "inductance_tolerance.L_scale"
+    blocks = [b for b in machine.blocks(at | {L: 1.0}, "a.nc") if b.equation in electrical.NAMES]
+    power, found = 0.0, 0.0
+    for b in blocks:
+        residual, column = whiten(b.bands, b.usable, np.column_stack([b.residual, b.columns[L]]))[b.usable].T
+        power, found = power + column @ column, found - column @ residual
+    assert power**-0.5 < 0.02  # relative, in one recording: less than the tolerance
+    assert found / power == pytest.approx(scale - 1.0, abs=4.0 * power**-0.5)

@@ -5,15 +5,17 @@ flux between the interval's ends.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import binary_dilation
 
 from .acquisition import bent, recorded_late
-from .commutation import EDGE, REACH, rows_of
+from .commutation import EDGE, LONGEST, REACH, rows_of, sweep
 from .dual import Dual, value_of
 from .point import State, effect_name
+from .signals import passing_time
 from .terms import with_hook
 
 RUN = 1e-3  # s, longest run of intervals that is averaged in motion
@@ -28,7 +30,7 @@ def voltages(state: State) -> list[Dual]:
     """Mean true voltage of each phase, terminal to star point, without that of the inductance (V)."""
     rec, a = state.rec, state.rec.actuator
     out = []
-    state.rise = []
+    state.rise, state.inductance = [], []
     for j in range(3):
         flux = state.current_end[j]
         for m in with_hook("flux"):
@@ -37,9 +39,12 @@ def voltages(state: State) -> list[Dual]:
         for m in with_hook("inductance"):
             L = L * m.inductance(state.p.of(effect_name(m)), rec, j)
         L = L * state.turns[j] * state.turns[j]
+        state.inductance.append(float(value_of(L)))
         rise = L * flux.linear(_difference, rec.size) * (1.0 / rec.interval)
-        if rec.current_end is None:  # the ripple outweighs what neighbouring means tell of the flux
-            rise = Dual(rise.value) + state.p(f"ends.{'abc'[j]}@{rec.name}") * _by_curvature(state, j)
+        if rec.current_end is None:
+            across = _runs(state, j).across
+            rise = Dual(rise.value, {n: np.where(across, s, 0.0) for n, s in rise.slopes.items()})
+            rise = rise + state.p(f"ends.{'abc'[j]}@{rec.name}") * _by_curvature(state, j)
         state.rise.append(rise)
         back_emf = np.asarray(value_of(state.k[j] * state.swept[j]))
         by_calm = state.k[j] * state.regressor[j]
@@ -94,61 +99,107 @@ def _recorded(state: State, true: list[Dual]) -> list[Dual]:
 def usable(state: State, j: int) -> np.ndarray:
     """(row,) which rows count."""
     if state.rec.current_end is None:
-        return np.ones(len(_runs(state, j)[0]), bool)
+        return np.ones(len(_runs(state, j).starts), bool)
     out = np.ones(state.rec.size, bool)
     out[0] = out[-1] = False
     return out
 
 
+@dataclass(frozen=True)
+class Runs:
+    """Intervals that are averaged to one row where no end currents are recorded, and those that cross a commutation."""
+
+    rows: np.ndarray  # (sample,) intervals that belong to a run, in their order
+    starts: np.ndarray  # (run,) where each begins among ``rows``
+    lengths: np.ndarray  # (run,) intervals in it
+    across: np.ndarray  # (interval,) bool: of a run in which the phase is switched on or off
+    crosses: np.ndarray  # (run,) bool: the same of the run
+
+    def mean(self, x: np.ndarray) -> np.ndarray:
+        """(run,) of (interval,)."""
+        return np.add.reduceat(np.asarray(x, float)[self.rows], self.starts) / self.lengths
+
+    def at_ends(self, x: np.ndarray) -> np.ndarray:
+        """(run,) sum over its two ends of what stands (interval,) at the end of each interval."""
+        first, last = self.rows[self.starts], self.rows[self.starts + self.lengths - 1]
+        return x[first - 1] + x[last]
+
+
 def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
-    """Means over runs of intervals between commutations, where no end currents are recorded: (sample,) -> (run,).
+    """Means over runs of intervals, where no end currents are recorded: (interval,) -> (run,).
 
     The flux's change over a run is that between its ends, so that the ripple in between drops out, which neighbouring
-    means do not tell and which goes with the ripple of the regressors.
+    means do not tell and which goes with the ripple of the regressors. A run that crosses a commutation has its phase's
+    whole current as its change, and so tells the inductance to the ripple at the end at which it conducts.
     """
-    starts, lengths, rows = _runs(state, j)
-    return lambda x: np.add.reduceat(np.asarray(x, float)[rows], starts) / lengths
+    return _runs(state, j).mean
 
 
-def _runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where runs begin among their rows, their lengths, and the rows (sample,): none around phase j's commutations."""
+def _runs(state: State, j: int) -> Runs:
+    """Runs of phase j: between its commutations, and one across each of them or of several that lie close."""
     rec = state.rec.rows_from
     return rec.once(("runs", j), lambda: _new_runs(state, j))
 
 
-def _new_runs(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _new_runs(state: State, j: int) -> Runs:
     rec = state.rec.rows_from
-    known = np.ones(rec.size, bool)
-    known[[0, -1]] = False
+    crossing = np.zeros(rec.size, bool)
     for edge in (j, (j + 1) % 3):
-        for shift in (-1, 0, 1):
-            known[np.clip(rows_of(state, edge) + shift, 0, rec.size - 1)] = False
-    rows = np.flatnonzero(known)
-    moves = rec.moving[rows]
+        for rows, after in ((rows_of(state, edge), 1), *_slow_edges(rec, edge)):
+            for shift in range(-1, after + 1):
+                crossing[np.clip(rows + shift, 0, rec.size - 1)] = True
+    rows = np.arange(1, rec.size - 1)
+    kind = np.where(crossing, 2, rec.moving)[rows]
     # at rest the ripple is the same again and again, and beats with short runs in a way that motion does not
-    fresh = np.concatenate([[True], (np.diff(rows) > 1) | np.diff(moves)])
+    fresh = np.concatenate([[True], np.diff(kind) != 0])
     # ends that follow commutations regularly would show the ripple, aliased, as a wave at constant speed
     rng = np.random.default_rng(0)
     starts = []
     for first, end in pairwise([*np.flatnonzero(fresh), len(rows)]):
-        longest = (RUN if moves[first] else RESTING) / rec.interval
+        if kind[first] == 2:
+            starts.append(first)
+            continue
+        longest = (RUN if kind[first] else RESTING) / rec.interval
         at = first
         while at < end:
             starts.append(at)
             at += max(1, round(longest * rng.uniform(*LENGTHS)))
-    return np.array(starts), np.diff(starts, append=len(rows)), rows
+    starts = np.array(starts)
+    return Runs(rows, starts, np.diff(starts, append=len(rows)), crossing, crossing[rows[starts]])
+
+
+def _slow_edges(rec, edge: int) -> list[tuple[np.ndarray, int]]:
+    """Intervals with an edge at which a current takes too long to pass over within one, and how many it takes; where
+    a phase, off, rests for longer than that before it is on again."""
+    low, high, _ = sweep(rec, edge)
+    there = np.flatnonzero((low < REACH) & (high > -REACH) & rec.moving)
+    takes = passing_time(rec.actuator, np.abs(rec.current[there]).max(axis=1)) / rec.interval
+    rests = (np.pi / 3.0) / np.maximum(high - low, 1e-12)[there]
+    after = 1 + np.ceil(takes).astype(int)
+    slow = (takes > LONGEST) & (rests > after + 4)  # two intervals of rest on either side
+    return [(there[slow & (after == n)], n) for n in np.unique(after[slow]).tolist()]
 
 
 def switched_on(state: State, j: int) -> np.ndarray:
     """(sample,) where phase j conducts at any time of an interval or of the ``BESIDE`` next to it on either side."""
     rec = state.rec.rows_from
-    return rec.once(("switched_on", j), lambda: _switched_on(rec, j))
+    return rec.once(("switched_on", j), lambda: binary_dilation(_conducts(rec, j), iterations=BESIDE))
 
 
-def _switched_on(rec, j: int) -> np.ndarray:
+def conducts_after(state: State, j: int) -> np.ndarray:
+    """(sample,) where phase j conducts at any time of an interval or of the next."""
+    rec = state.rec.rows_from
+    return rec.once(("conducts_after", j), lambda: _either(_conducts(rec, j)))
+
+
+def _either(x: np.ndarray) -> np.ndarray:
+    return x | np.append(x[1:], x[-1:])
+
+
+def _conducts(rec, j: int) -> np.ndarray:
     x = np.mod(rec.actuator.pole_pairs * rec.middle - rec.axis[j], np.pi)
     reach = EDGE - REACH - rec.actuator.pole_pairs * np.abs(rec.half_sweep)
-    return binary_dilation((x > reach) & (x < np.pi - reach), iterations=BESIDE)
+    return (x > reach) & (x < np.pi - reach)
 
 
 def noise_bands(state: State, j: int) -> list[np.ndarray]:
@@ -158,13 +209,16 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
     f = np.asarray(value_of(state.conducting[j]))
     angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
     if rec.current_end is None:
-        of, (_, lengths, _) = averaging(state, j), _runs(state, j)
+        runs = _runs(state, j)
+        of, lengths = runs.mean, runs.lengths
         # at a run's ends the mean of two neighbours is off by the ripple, and by a sixth of the curvature
         i = rec.current[:, j]
         bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:])) / 6.0
-        ends = switched_on(state, j) * a.hysteresis**2 / 3.0 + bend**2
-        ends = 2.0 * (a.inductance / rec.interval / lengths) ** 2 * of(ends)
-        unknown = (UNKNOWN * of(np.asarray(value_of(state.rise[j])))) ** 2
+        ripple = a.hysteresis**2 / 3.0
+        between = 2.0 * of(switched_on(state, j) * ripple + bend**2)
+        across = runs.at_ends(conducts_after(state, j) * ripple + bend**2)
+        ends = (state.inductance[j] / rec.interval / lengths) ** 2 * np.where(runs.crosses, across, between)
+        unknown = np.where(runs.crosses, 0.0, UNKNOWN * of(np.asarray(value_of(state.rise[j])))) ** 2
         return [(white + 2.0 * of(angle) / lengths) / lengths + ends + unknown]
     differenced = (a.inductance / rec.interval * s.current_end) ** 2 + angle
     before = np.concatenate([differenced[:1], differenced[:-1]])
