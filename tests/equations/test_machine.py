@@ -3,6 +3,7 @@
 import numpy as np
 
 from emafault.diagnosis.fit import NOTHING, Bench
+from emafault.diagnosis.linear import disturbance, raw_columns
 from emafault.effects import EFFECTS
 from emafault.equations import commutation
 from emafault.equations.point import Point, State
@@ -60,3 +61,33 @@ def test_an_edge_at_the_end_of_an_interval_is_no_corner(nominal):
         slope = np.broadcast_to(at(x).columns[edge], len(at(x).residual))
         difference = (at(x + step).residual - at(x - step).residual) / (2.0 * step)
         assert np.all(np.abs(slope - difference) <= 0.02 * np.maximum(np.abs(slope), np.abs(difference)) + 1e-3)
+
+
+def test_a_remainder_has_the_noise_of_what_it_is_driven_by():
+    """It may be the very column that a coefficient has: were the noise taken out of one of both alone, their
+    difference, which is nothing, would have less than no power, and the fit would go wherever that leads."""
+    machine = machine_of({"a.nc": recorded()})
+    values = {n: p.off for n, p in machine.parameters.items()}
+    k, same = "unit_calibration.k_scale", "remainder.torque.2.0"
+    blocks, disturbed = ([*machine.blocks(values, "a.nc", disturbed=d, wanted={k})] for d in (False, True))
+    block, other = (next(b for b in bs if b.equation == "torque") for bs in (blocks, disturbed))
+    names, columns = raw_columns(block, [k], True)
+    found = dict(zip(names, columns, strict=False))
+    share = float(found[k] @ found[same] / (found[same] @ found[same]))
+    assert np.allclose(found[k], share * found[same], rtol=1e-4, atol=1e-9 * abs(found[k]).max())
+    noise = disturbance(block, other, names, None)
+    at, remains = names.index(k), names.index(same)
+    assert noise[at, at] > 0.0
+    difference = noise[at, at] - 2.0 * share * noise[at, remains] + share**2 * noise[remains, remains]
+    assert abs(difference) < 1e-4 * noise[at, at]
+
+
+def test_normal_matrices_are_the_same_in_any_number_of_processes():
+    """What is computed once is not that of the point at which a process first looked."""
+    named = {f"r{n}": recorded(c, seed=n) for n, c in enumerate(("parabolic", "sine"))}
+    found = []
+    for processes in (1, 2):
+        bench = Bench(machine_of(named), list(named), processes)
+        bench.point["unit_calibration.k_scale"] *= 1.01
+        found.append(bench.linearise(renew=True))
+    assert all(np.array_equal(a.gram, b.gram) for a, b in zip(*found, strict=True))

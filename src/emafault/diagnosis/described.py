@@ -329,21 +329,23 @@ def curve(
 def another_form_of(
     reduced: Callable[[tuple[str, ...]], Reduced], search: Search, unit: str, deviations: Mapping[str, float]
 ) -> str | None:
-    """Listed effect whose signal is nearly that of a form, the nuisances taken out of both; None where there is none.
+    """Listed effect whose signal is nearly that of a form or a remainder, the nuisances taken out of both; None where
+    there is none.
 
     The tolerance of a quantity that the effect is another value of is not: it would take the effect out with it.
 
     Parameters
     ----------
     reduced : the linear model with the nuisances marginalised but for those named
-    deviations : the form's coefficients
+    deviations : coefficients of the set that has it
 
     Notes
     -----
-    The cosine is that between what the form adds and the nearest that the effect can.
+    The cosine is that between what it adds and the nearest that the effect can.
     """
     best, nearest = ALIKE**2, None
-    own = [n for n in search.candidates[unit, 0].names if n in deviations]
+    every = dict.fromkeys(n for (u, _), c in search.candidates.items() if u == unit for n in c.names)
+    own = [n for n in every if n in deviations]
     c = np.array([deviations[n] for n in own])
     for (other, variant), candidate in search.candidates.items():
         if search.units[other].kind not in LISTED or variant >= OTHER_FORM:

@@ -39,20 +39,29 @@ class White:
 def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.ndarray]]:
     """Columns of an equation's undescribed remainder, ``size`` high: functions of each coordinate, the equation's own
     drivers with coefficients that change along them, and slow functions with coefficients of each recording's own."""
-    drivers, phi = block.coordinates["drivers"], block.coordinates["phi"]
-    sizes = block.coordinates.get("sizes", {})  # of drivers whose coefficient is known to change by so much
-    names, columns = [], []
-    for f, function in enumerate(phi):
-        names.append(f"remainder.{block.equation}.0.{f}")
-        columns.append(size * function)
-    for d, driver in enumerate(drivers[1:], start=1):
-        for f in block.coordinates["slow"] if sizes.get(d, size) > 0.0 else ():
-            names.append(f"remainder.{block.equation}.{d}.{f}")
-            columns.append(sizes.get(d, size) * driver * phi[f])
+    phi = block.coordinates["phi"]
+    columns = {f"remainder.{block.equation}.0.{f}": size * function for f, function in enumerate(phi)}
+    columns |= _driven_columns(block, size, block.coordinates["drivers"])
     for f in block.coordinates.get("each", ()):
-        names.append(f"remainder.{block.equation}.0.{f}@{block.recording}")
-        columns.append(size * phi[f])
-    return names, columns
+        columns[f"remainder.{block.equation}.0.{f}@{block.recording}"] = size * phi[f]
+    return list(columns), list(columns.values())
+
+
+def _driven_columns(block: Block, size: float, drivers: np.ndarray) -> dict[str, np.ndarray]:
+    """Those of them that drivers (driver, row) have a coefficient in, or what changes of these change them by."""
+    phi = block.coordinates["phi"]
+    sizes = block.coordinates.get("sizes", {})  # of drivers whose coefficient is known to change by so much
+    return {
+        f"remainder.{block.equation}.{d}.{f}": sizes.get(d, size) * driver * phi[f]
+        for d, driver in enumerate(drivers[1:], start=1)
+        if sizes.get(d, size) > 0.0
+        for f in block.coordinates["slow"]
+    }
+
+
+def _size(block: Block) -> float:
+    """Noise of an equation's rows."""
+    return float(np.sqrt(np.median(block.bands[0])))
 
 
 def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
@@ -96,8 +105,7 @@ def raw_columns(
     names = [n for n in wanted if n in block.columns]
     columns = [block.columns[n] for n in names]
     if remainder:
-        size = float(np.sqrt(np.median(block.bands[0])))
-        more, extra = remainder_columns(block, size)
+        more, extra = remainder_columns(block, _size(block))
         names, columns = names + more, columns + extra
     for unit, amounts in (own or {}).items():
         more, extra = own_columns(block, unit, amounts)
@@ -152,6 +160,9 @@ def disturbance(
             name = f"own.{unit}.{block.equation}.{f}"
             if name in wanted:
                 changes[name] = more * function
+    if "changes" in block.coordinates:
+        driven = _driven_columns(block, _size(block), block.coordinates["changes"])
+        changes |= {n: c for n, c in driven.items() if n in wanted}
     changed = {n: c for n, c in changes.items() if np.any(c)}
     used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
     residual = np.asarray(disturbed.residual - block.residual)

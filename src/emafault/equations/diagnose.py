@@ -358,8 +358,8 @@ def _discovered(
         out.append(
             {
                 "unit": left, "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
-                "probability": float(reading.inclusion[left]), "closed": None, "another_form_of": None,
-                "parameters": {},
+                "probability": float(reading.inclusion[left]), "closed": None,
+                "another_form_of": another_form_of(partly, fit.search, left, model.deviations), "parameters": {},
                 "recordings": list(bench.recordings),
                 "sentence": remainder_sentence(fit.search, equation, changes),
             }

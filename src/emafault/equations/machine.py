@@ -220,11 +220,24 @@ class ReferenceActuator:
 
     # ---- equations
     def prepare(self, name: str) -> None:
-        """Compute once what does not depend on the point."""
-        if (name, "torque") not in self._along:
-            if not self.large:
-                self._disturbed[name] = self.recordings[name].disturbed(1)
-            self.blocks({n: p.off for n, p in self.parameters.items()}, name, wanted=())
+        """Compute once what does not depend on the point, or hardly: coordinates and drivers are those at "off"."""
+        if (name, "torque") in self._along:
+            return
+        point = Point({n: p.off for n, p in self.parameters.items()}, name, ())
+        self._recording(point.values, self.recordings[name], ())
+        noisy = State(self._noisy(name), point)
+        torque.residual(noisy)
+        for equation in (e for n, e in self._along if n == name and e not in SETTINGS):
+            along = self._along[name, equation]
+            along["changes"] = (np.array(self._drivers(noisy, equation)) - along["drivers"]).astype(np.float32)
+
+    def _noisy(self, name: str) -> Signals:
+        """A recording with one more draw of the sensors' noise."""
+        if name not in self._disturbed:
+            if self.large:
+                self._disturbed.clear()
+            self._disturbed[name] = self.recordings[name].disturbed(1)
+        return self._disturbed[name]
 
     def samples(self, name: str) -> int:
         """Number of samples of a recording."""
@@ -243,13 +256,8 @@ class ReferenceActuator:
         ``disturbed`` takes the recording with one more draw of the sensors' noise; ``less`` is what a channel has too
         much, (sample,).
         """
-        rec = self.recordings[name]
-        if disturbed:
-            if name not in self._disturbed:
-                if self.large:
-                    self._disturbed.clear()
-                self._disturbed[name] = rec.disturbed(1)
-            rec = self._disturbed[name]
+        self.prepare(name)
+        rec = self._noisy(name) if disturbed else self.recordings[name]
         return self._recording(values, _less(rec, less or {}), wanted)
 
     # ---- the measuring chain
@@ -277,6 +285,7 @@ class ReferenceActuator:
         off = {n: p.off for n, p in self.parameters.items()}
         if place.startswith("k_"):
             return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
+        self.prepare(name)
         before = self._recording(off, rec, ())
         step = self.place(place, "")[1] / STANDS_OUT
         found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}
@@ -408,50 +417,50 @@ class ReferenceActuator:
         rec = state.rec
         base = dict(self._functions_of(rec))
         phi = list(base.pop("phi"))
-        w = rec.speed / 100.0
-        drivers = [np.broadcast_to(1.0, rec.size)]
         kinds: dict[str, Any] = {
             "slow": SLOW_FUNCTIONS,
             "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
+            "drivers": np.array(self._drivers(state, equation)),
         }
-        if equation.startswith("electrical"):
-            j = "abc".index(equation[-1])
-            drivers += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
-        elif equation == "torque":  # friction, torque constant, inertia
-            typical = typical_torque(rec.actuator)
-            # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
-            drivers += [rec.direction, state.drive / typical, state.net / typical]
-            kinds["sizes"] = {2: SHARE * typical, 3: 0.0}
-        elif equation == "sensor_speed":
-            drivers += [
-                np.where(rec.moving, w, 0.0)
-            ]  # at rest the angle's rate is its noise, which the residual has too
-        elif equation == "sensor_current":
-            balanced = rec.current - rec.current.mean(axis=1, keepdims=True)
-            drivers += [balanced[:, j] for j in range(2)]
-        elif equation == "bus":
-            drivers += [state.bus_current]
-        elif equation == "position":
-            drivers += [base["direction"], rec.acceleration / 1e3]
         of = rows_of(state, equation)
+        if equation == "torque":
+            # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
+            kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}
         if equation == "control":
             phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
         elif equation.startswith("electrical") and of is not None:
             # what means over runs leave of ripple and commutations beats with both
             kinds |= {"highest_order": 0.5 * rec.actuator.pole_pairs, "highest_frequency": BEATS / electrical.RUN}
         if of is None:
-            return {"drivers": drivers, **kinds}
-        rows = [of(d) for d in drivers]
-        if equation == "control":
-            rows.append(control.late(state))
+            return kinds
         along = {k: of(v) for k, v in base.items()}
         return {
-            **along,
-            "rotor_angle": np.mod(along["angle"], 2.0 * np.pi),
-            "phi": np.array([of(f) for f in phi]),
-            "drivers": np.array(rows),
-            **kinds,
-        }
+            **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": np.array([of(f) for f in phi]), **kinds,
+        }  # fmt: skip
+
+    def _drivers(self, state: State, equation: str) -> list[np.ndarray]:
+        """(row,) each of the quantities that a coefficient of an equation multiplies, the first of them 1."""
+        rec = state.rec
+        out = [np.ones(rec.size)]
+        if equation.startswith("electrical"):
+            j = "abc".index(equation[-1])
+            out += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
+        elif equation == "torque":  # friction, torque constant, inertia
+            typical = typical_torque(rec.actuator)
+            out += [rec.direction, state.drive / typical, state.net / typical]
+        elif equation == "sensor_speed":  # at rest the angle's rate is its noise, which the residual has too
+            out += [np.where(rec.moving, rec.speed / 100.0, 0.0)]
+        elif equation == "sensor_current":
+            balanced = rec.current - rec.current.mean(axis=1, keepdims=True)
+            out += [balanced[:, j] for j in range(2)]
+        elif equation == "bus":
+            out += [state.bus_current]
+        elif equation == "position":
+            out += [self._functions_of(rec)["direction"], rec.acceleration / 1e3]
+        of = rows_of(state, equation)
+        if of is not None:
+            out = [of(d) for d in out]
+        return [*out, control.late(state)] if equation == "control" else out
 
 
 def typical_torque(actuator: ActuatorParameters) -> float:
