@@ -155,17 +155,16 @@ def _new_runs(state: State, j: int) -> Runs:
     # ends that follow commutations regularly would show the ripple, aliased, as a wave at constant speed
     rng = np.random.default_rng(0)
     starts = []
-    for first, end in pairwise([*np.flatnonzero(fresh), len(rows)]):
-        if kind[first] == 2:
-            starts.append(first)
+    for at, end in pairwise([*np.flatnonzero(fresh), len(rows)]):
+        if kind[at] == 2:
+            starts.append(at)
             continue
-        longest = (RUN if kind[first] else RESTING) / rec.interval
-        at = first
+        longest = (RUN if kind[at] else RESTING) / rec.interval
         while at < end:
             starts.append(at)
             at += max(1, round(longest * rng.uniform(*LENGTHS)))
-    starts = np.array(starts)
-    return Runs(rows, starts, np.diff(starts, append=len(rows)), crossing, crossing[rows[starts]])
+    first = np.array(starts)
+    return Runs(rows, first, np.diff(first, append=len(rows)), crossing, crossing[rows[first]])
 
 
 def _slow_edges(rec, edge: int) -> list[tuple[np.ndarray, int]]:
