@@ -14,7 +14,7 @@ from .search import FORM_PRIOR, OTHER_FORM, Search
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
-BINS = 30  # of a picture
+BINS = (30, 15, 8)  # of a picture: the most that show more than their errors
 FINER = 2.0  # times what a coarse look finds, that a fine one may
 REFINED = 3  # rounds over the parameters of a shape
 STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
@@ -305,25 +305,35 @@ def curve(
     for b in own:
         here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
         along[b.recording] = module.position(b.coordinates, form.values, here)
+    both = [
+        Left(form.seen or form.equation, which, [carried[b.recording][b.equation] for b in own])
+        for which in (without(machine, form, own, values), own)
+    ]
+    for bins in BINS:
+        x, (before, after), error = _binned(both, along, bins, form.driver)
+        if np.var(before) > 2.0 * np.mean(error**2):
+            break
+    return {"x": x.tolist(), "before": before.tolist(), "after": after.tolist(), "error": error.tolist()}
+
+
+def _binned(
+    lefts: Sequence[Left], along: Mapping[str, np.ndarray], bins: int, driver: int
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Middles of bins along a coordinate, what each of several residuals has there and the standard error of that."""
     low, high = min(x.min() for x in along.values()), max(x.max() for x in along.values())
-    edges = np.linspace(low, high, BINS + 1)
+    edges = np.linspace(low, high, bins + 1)
 
     def cells(b: Block) -> np.ndarray:
-        at = np.clip(np.searchsorted(edges, along[b.recording], "right") - 1, 0, BINS - 1)
-        return at == np.arange(BINS)[:, None]
+        at = np.clip(np.searchsorted(edges, along[b.recording], "right") - 1, 0, bins - 1)
+        return at == np.arange(bins)[:, None]
 
     means = []
-    for which in (without(machine, form, own, values), own):
-        left = Left(form.seen or form.equation, which, [carried[b.recording][b.equation] for b in own])
-        g, G = left.products(cells, form.driver)
+    for left in lefts:
+        g, G = left.products(cells, driver)
         used = np.diag(G) > 1e-9 * np.diag(G).max()
         inverse = np.linalg.pinv(G[np.ix_(used, used)], hermitian=True)
         means.append(inverse @ g[used])
-    x = 0.5 * (edges[1:] + edges[:-1])[used]
-    return {
-        "x": x.tolist(), "before": means[0].tolist(), "after": means[1].tolist(),
-        "error": np.sqrt(np.maximum(np.diag(inverse), 0.0)).tolist(),
-    }  # fmt: skip
+    return 0.5 * (edges[1:] + edges[:-1])[used], means, np.sqrt(np.maximum(np.diag(inverse), 0.0))
 
 
 def another_form_of(
