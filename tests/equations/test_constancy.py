@@ -6,7 +6,8 @@ import pytest
 
 from emafault.diagnosis.constancy import PRIOR, log_odds_of_change
 from emafault.diagnosis.fit import Bench
-from emafault.equations.diagnose import diagnose, remainder_sentence
+from emafault.equations.diagnose import diagnose
+from emafault.equations.verdict import remainder_sentence
 
 from .conftest import ACTUATOR, NOISE, machine_of, recorded
 

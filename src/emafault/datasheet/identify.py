@@ -19,9 +19,9 @@ from ..diagnosis.fit import NOTHING, Bench
 from ..diagnosis.model import SETTINGS
 from ..diagnosis.naming import read
 from ..effects.scaling import scaled
-from ..equations.diagnose import covariance_of
 from ..equations.machine import ReferenceActuator
 from ..equations.signals import Signals, estimated_noise
+from ..equations.verdict import covariance_of
 from ..errors import InputError, shown
 from ..io.bench import read_bench
 from ..io.recording import Recording, read_recording, recordings_in

@@ -7,7 +7,8 @@ import numpy as np
 from ..diagnosis.point import is_parameter
 from ..effects import EFFECTS
 from ..reporting.numbers import Number, Numbers, as_told
-from .diagnose import CONTROLLER, Diagnosed, covariance_of
+from .diagnose import Diagnosed
+from .verdict import CONTROLLER, covariance_of
 
 
 def numbers(found: Diagnosed) -> Numbers:

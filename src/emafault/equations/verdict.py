@@ -1,0 +1,344 @@
+"""The verdict, in the format of ``diagnosis.json``, from where a bench's search ended."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+from ..diagnosis.described import another_form_of, curve
+from ..diagnosis.evidence import Definite, Normal, Reduced
+from ..diagnosis.fit import Bench, Fit
+from ..diagnosis.naming import Reading
+from ..diagnosis.point import is_parameter
+from ..diagnosis.search import Model, Search
+from ..diagnosis.where import where
+from ..effects import EFFECTS
+from ..faults import FAULT_NAMES
+from ..io.recording import Recording
+from . import carried, telling
+from .held_out import HeldOut
+from .how_far import null, shrinks
+from .machine import ReferenceActuator
+from .point import SEEDED
+from .quality import at_a_glance, told
+from .telling import EQUATION, Z
+from .terms import TERMS
+
+SCHEMA = "2.0"
+CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
+SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Where a bench's search ended, what its sets say, and what the confirm recordings said of that."""
+
+    machine: ReferenceActuator
+    bench: Bench
+    fit: Fit
+    reading: Reading
+    held_out: HeldOut | None
+
+    @cached_property
+    def leading(self) -> Model:
+        """The set that is told."""
+        named = self.reading.named + tuple(g for q in self.reading.groups for g in q)
+        return self.reading.sets[0][2] if self.reading.sets and named else self.fit.models[0]
+
+    @cached_property
+    def before(self) -> dict[str, float]:
+        """All parameters of the recalibrated nominal model."""
+        return null(self.bench).values()
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """All parameters at the leading set's fit."""
+        return self.bench.inserted(self.leading, self.fit.normal).values
+
+    @property
+    def changes(self) -> Mapping[str, float]:
+        """By effect, log odds that it has another size in each recording."""
+        return self.held_out.changes if self.held_out else {}
+
+
+def verdict_of(
+    name: str,
+    split: tuple[Sequence[str], Sequence[str]],
+    fitted: Fitted,
+    sealed: Mapping[str, Any],
+    recordings: Mapping[str, Recording],
+    quality: Mapping[str, Any],
+) -> dict[str, Any]:
+    """The verdict on a bench.
+
+    Parameters
+    ----------
+    split : names of the recordings that explore and of those that confirm
+    sealed : what the explored recordings said before the others were opened
+    quality : of the recordings, by name: see ``quality.seen``
+    """
+    bench, machine, reading = fitted.bench, fitted.machine, fitted.reading
+    found = where(bench.signals(_from_off(bench, fitted.leading)), EQUATION)
+    listed = [u.id for u in bench.units if u.kind in ("structural", "calibration")]
+    faults = _faults(fitted, recordings)
+    discovered = [*told(quality), *_discovered(fitted)]
+    which = _which(fitted, found)
+    before, after = _simulators(fitted, which)
+    out: dict[str, Any] = {
+        "bench": name, "schema": SCHEMA, "twin": "actuator", "verdict": reading.verdict, "sealed": sealed,
+        "before_confirm": sealed["verdict"], "digest": sealed["digest"],
+        "recordings": {"explore": list(split[0]), "confirm": list(split[1])},
+        "where": found, "which": which,
+        "inclusion": {e: round(float(reading.inclusion.get(e, 0.0)), 5) for e in (*listed, *machine.observed())},
+        "discovered": discovered, "quality": at_a_glance(quality), "groups": [list(g) for g in reading.groups],
+        "controller": _controller(fitted), "fault_vector": faults, "biased_outputs": _biased(faults),
+        "shrinks": shrinks(bench, fitted.held_out, faults, recordings, discovered, reading.told),
+        "simulator": {"before": before, "after": after},
+    }  # fmt: skip
+    if fitted.held_out is not None:
+        out["held_out"] = {e: round(r, 3) for e, r in fitted.held_out.ratios.items()}
+    return out | {"next_experiment": [], "warnings": []}
+
+
+def _from_off(bench: Bench, model: Model) -> dict[str, float]:
+    """A model's own parameters as deviations from off, by the name of their columns."""
+    out: dict[str, float] = {}
+    for n, d in model.deviations.items():
+        if not is_parameter(n):
+            if n.startswith("remainder."):
+                out[n] = d
+            continue
+        p = bench.parameters[n]
+        out[p.alias or n] = out.get(p.alias or n, 0.0) + d - bench.prior(n)[2]
+    return out
+
+
+def _parameters(bench: Bench, machine: ReferenceActuator, effects: Sequence[str], model: Model) -> dict[str, dict]:
+    """Fitted catalogue parameters of a set with 90 % intervals."""
+    out: dict[str, dict] = {}
+    for effect in effects:
+        if effect in machine.observed():
+            step = machine.observed()[effect]["step"]
+            reported = {"step": (step, 1e-3 * step)}
+        else:
+            reported = _reported(bench, effect, model)
+        for name, (value, sd) in reported.items():
+            known = EFFECTS[effect].parameters.get(name)
+            units = known.units if known else {"C": "J/K"}.get(name, "1")
+            key = name if name not in out else f"{effect}.{name}"
+            out[key] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": units, "effect": effect}
+    return out
+
+
+def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float, float]]:
+    values, spread = {}, {}
+    for n, d in model.deviations.items():
+        if not is_parameter(n):
+            continue
+        p = bench.parameters[n]
+        if n.split(".")[0].split("#")[0] != effect:
+            continue
+        if p.secant is not None:
+            for full, at in p.secant.items():
+                off = bench.parameters[full].off
+                values[full.split(".", 1)[1]] = off + (at - off) * (d if full == next(iter(p.secant)) else 1.0)
+                spread[full.split(".", 1)[1]] = abs(at - off) * model.spread[n]
+            continue
+        short = n.split(".", 1)[1].rstrip("+")
+        values[short] = bench.after({n: d})[n] + (bench.point[p.alias] if p.alias else 0.0)
+        spread[short] = model.spread[n]
+    report = getattr(TERMS[effect], "report", None)
+    if report is not None and values:
+        return report(values, spread)
+    return {n: (v, spread[n]) for n, v in values.items()}
+
+
+def _which(fitted: Fitted, found: Sequence[Mapping]) -> list[dict]:
+    """Sets with their probabilities and parameters, the empty set and the unknown; the verdict's own first."""
+    bench, machine, reading, search = fitted.bench, fitted.machine, fitted.reading, fitted.fit.search
+    grouped = {e for g in reading.groups for e in g}
+    entries: list[dict[str, Any]] = []
+    for effects, p, model in reading.sets[:12]:
+        inside = grouped & set(effects)
+        entries.append(
+            {
+                "effects": list(effects), "probability": p, "group": "group 1" if inside and reading.groups else None,
+                "parameters": _parameters(bench, machine, effects, search.wide(model)),
+                "log_evidence_gain": float(model.log_likelihood - search.fit(()).log_likelihood),
+            }
+        )  # fmt: skip
+    rest = sum(p for _, p, _ in reading.sets[12:])
+    empty: dict[str, Any] = {"effects": [], "probability": reading.empty, "group": None}
+    equation = _equation(reading, found)
+    unknown: dict[str, Any] = {
+        "effects": ["unknown"],
+        "equation": equation,
+        "probability": reading.unknown + rest,
+        "group": None,
+    }
+    total = sum(e["probability"] for e in (*entries, empty, unknown))
+    for e in (*entries, empty, unknown):
+        e["probability"] = round(float(e["probability"]) / total, 6)
+    if reading.verdict in ("no_gap", "described"):
+        return [empty, *entries, unknown]
+    if reading.verdict == "unknown":
+        return [unknown, *entries, empty]
+    named = set(reading.named)
+    entries.sort(key=lambda e: (not named <= set(e["effects"]), -e["probability"]))
+    return [*entries, empty, unknown]
+
+
+def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
+    left = sorted((k for k in reading.inclusion if k.startswith("remainder:")), key=lambda k: -reading.inclusion[k])
+    if left and reading.inclusion[left[0]] > 0.1:
+        equation = left[0].split(":", 1)[1]
+        return EQUATION.get(equation, equation)
+    return str(found[0]["equation"]) if found else "electrical"
+
+
+def _discovered(fitted: Fitted) -> list[dict]:
+    """Forms that no catalogue lists, and remainders, as the verdict tells them."""
+    bench, machine, fit, reading, model = fitted.bench, fitted.machine, fitted.fit, fitted.reading, fitted.leading
+    out = []
+
+    @cache
+    def partly(but: tuple[str, ...]) -> Reduced:
+        return bench.reduce(fit.normal, but) if but else fit.search.reduced
+
+    described = {d.id: d for d in bench.described}
+    for form in reading.forms:
+        unit = next(u for u in bench.units if u.id == form)
+        linear = {
+            p.name: (bench.after({p.name: model.deviations[p.name]})[p.name], model.spread[p.name])
+            for p in unit.parameters
+            if p.name in model.deviations
+        }
+        if form in described:
+            values = bench.point | {n: v for n, (v, _) in linear.items()}
+            blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
+            found = curve(bench.machine, described[form], blocks, bench.carried, values)
+            entry = telling.told(described[form], linear, machine.actuator)
+            entry["curve"] = telling.picture(described[form], found, machine.actuator)
+            entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
+        else:
+            units = {p.name: p.units for p in unit.parameters}
+            entry = telling.told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+            entry["term"] = carried.of_chain(form, linear)
+        out.append(
+            {
+                "unit": form, "probability": float(reading.inclusion[form]), "closed": None,
+                "another_form_of": another_form_of(partly, fit.search, form, model.deviations),
+                "recordings": list(bench.recordings), **entry,
+            }
+        )  # fmt: skip
+    for left in reading.remainders:
+        equation = left.split(":", 1)[1]
+        out.append(
+            {
+                "unit": left, "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
+                "probability": float(reading.inclusion[left]), "closed": None,
+                "another_form_of": another_form_of(partly, fit.search, left, model.deviations), "parameters": {},
+                "recordings": list(bench.recordings),
+                "sentence": remainder_sentence(fit.search, equation, fitted.changes),
+            }
+        )  # fmt: skip
+    return out
+
+
+def remainder_sentence(search: Search, equation: str, changes: Mapping[str, float]) -> str:
+    """What an equation leaves, and what it looks like in each recording, were it of one size in all."""
+    like = [
+        TERMS[e].SENTENCE
+        for e, odds in changes.items()
+        if odds > 0.0 and equation.startswith(tuple(search.units[e].equations))
+    ]
+    said = f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further."
+    if like:
+        said += f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
+    return said
+
+
+def _controller(fitted: Fitted) -> dict[str, dict]:
+    """The controller's gains as fitted in the control equation."""
+    bench, fit, values = fitted.bench, fitted.fit, fitted.values
+    index = fit.normal.index
+    n = [x for x in bench.nuisances if x.startswith("controller.")]
+    if "remainder:control" in fitted.reading.remainders:  # which may stand in for a gain
+        n += [x for x in index if x.startswith("remainder.control.")]
+    k = np.array([index[x] for x in n])
+    prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
+    covariance = Definite(fit.normal.H[np.ix_(k, k)] + np.diag(prior)).solve(np.eye(len(k)))
+    out = {}
+    for name, units in CONTROLLER.items():
+        full = f"controller.{name}"
+        value, nominal = values[full], bench.parameters[full].off
+        sd = float(np.hypot(np.sqrt(covariance[n.index(full), n.index(full)]), SAMPLED * abs(value)))
+        out[name] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": units, "nominal": nominal}
+    return out
+
+
+def covariance_of(bench: Bench, normal: Normal, model: Model) -> tuple[dict[str, int], np.ndarray]:
+    """Places of the nuisances and a model's own parameters, and the posterior covariance with all of them free."""
+    names = [*bench.nuisances, *(n for n in model.deviations if is_parameter(n))]
+    k = np.array([normal.index[n] for n in names])
+    sd = np.array([bench.prior(n)[1] for n in names])
+    A = normal.H[np.ix_(k, k)] * np.outer(sd, sd) + np.eye(len(k))
+    return {n: k for k, n in enumerate(names)}, Definite(A).solve(np.eye(len(k))) * np.outer(sd, sd)
+
+
+def _faults(fitted: Fitted, recordings: Mapping[str, Recording]) -> dict[str, dict]:
+    """By recording the fault vector before and after, with 90 % intervals."""
+    bench = fitted.bench
+    out: dict[str, dict] = {}
+    index, covariance = covariance_of(bench, fitted.fit.normal, fitted.leading)
+    for name in bench.recordings:
+        rec = bench.machine.recordings[name]
+        out[name] = {"before": {}, "after": {}}
+        for component in FAULT_NAMES:
+            shift = rec.dT_measured if component == "dT" else 0.0
+            parts = [component if component != "dT" and rec.health == "unknown" else f"{component}@{name}"]
+            if component != "dT" and rec.health == "seeded":
+                parts.append(SEEDED + component)
+            k = [index[n] for n in parts if n in index]
+            sd = float(np.sqrt(covariance[np.ix_(k, k)].sum()))
+            for stage, values in (("before", fitted.before), ("after", fitted.values)):
+                value = float(sum(values[n] for n in parts)) + shift
+                if component.startswith("N") and len(parts) > 1:  # shares of the turns multiply
+                    value -= float(np.prod([values[n] for n in parts]))
+                out[name][stage][component] = {"value": value, "low": value - Z * sd, "high": value + Z * sd}
+    return out
+
+
+def _biased(vectors: Mapping[str, dict]) -> dict[str, float]:
+    out = {}
+    for component in FAULT_NAMES:
+        shift = [v["before"][component]["value"] - v["after"][component]["value"] for v in vectors.values()]
+        width = [v["after"][component]["high"] - v["after"][component]["low"] for v in vectors.values()]
+        if shift and abs(np.mean(shift)) > 0.25 * np.mean(width):
+            out[component] = float(np.mean(shift))
+    return out
+
+
+def _simulators(fitted: Fitted, which: Sequence[Mapping]) -> tuple[dict, dict]:
+    """The unit before anything was found and after, as parameters of the catalogue."""
+    named = [{**p, "name": n.split(".", 1)[-1]} for entry in which[:1] for n, p in entry.get("parameters", {}).items()]
+    before = _simulator(fitted.bench, fitted.before, ())
+    # what is described changes the unit as well as an effect does
+    changed = named or fitted.reading.forms
+    return before, _simulator(fitted.bench, fitted.values, named) if changed else before
+
+
+def _simulator(bench: Bench, values: Mapping[str, float], found: Sequence[Mapping]) -> dict[str, dict[str, float]]:
+    """The unit's tolerances and named effects as parameters of the catalogue: effect -> parameter -> value."""
+    out: dict[str, dict[str, float]] = {}
+    for n in bench.nuisances:
+        if "@" not in n and "." in n and n.split(".")[0] in EFFECTS:
+            effect, name = n.split(".", 1)
+            out.setdefault(effect, {})[name] = float(values[n])
+    for p in found:
+        effect = p["effect"]
+        if p["name"] in EFFECTS[effect].parameters:
+            out.setdefault(effect, {})[p["name"]] = float(p["value"])
+    return out
