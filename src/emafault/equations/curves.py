@@ -6,9 +6,10 @@ from scipy.ndimage import uniform_filter1d
 from ..diagnosis.model import Block
 from ..diagnosis.whitening import whiten
 from ..reporting.panels import Curves, Panel
+from .coordinates import rows_of
 from .diagnose import Diagnosed
 from .electrical import NAMES
-from .machine import ReferenceActuator, rows_of
+from .machine import ReferenceActuator
 from .point import Point, State
 from .signals import Signals, odd
 

@@ -14,7 +14,7 @@ from ..diagnosis.search import Model
 from ..io.recording import Recording
 from . import electrical
 from .held_out import HeldOut
-from .machine import FAULTS
+from .parameters import FAULTS
 from .point import SEEDED
 from .telling import Z
 

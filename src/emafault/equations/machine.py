@@ -1,40 +1,21 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..diagnosis.model import SETTINGS, Block, Parameter, Unit, Variant
+from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
-from ..effects.scaling import scale, scaled
+from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
+from .coordinates import ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
-from .point import SEEDED, Point, State
-from .signals import REST, Signals
-from .terms import TERMS
+from .parameters import PER_PHASE, internal, measuring_chain, nuisances, unit_of
+from .point import Point, State
+from .signals import Signals
 
-FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
-HEALTHY = 1e-3
-SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
-EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
-ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
-TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
-CURVATURE = 10.0  # times a smooth current's, by which a current at an interval's end is off its neighbours' mean
-LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
-BEND = 0.03  # of a channel's full range, that its curve may be off by there
-SKEW = 1e-6  # s, by which channels may be sampled apart
-SOAK = 0.5  # K, of the measured ambient temperature
-GAIN_PRIOR = 0.3  # relative, of the controller's gains
-LEVEL = 4  # of the functions of a remainder: the current's
-SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
-EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
-#: functions of a remainder along one coordinate: speed, current, time and temperature, angle
-ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
-OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
-PER_PHASE = ("a", "b", "c")
 #: channels whose faults show in an equation, as what one of its drivers multiplies: a wave of the recorded angle is
 #: also one of its rate, times the speed
 CHANNELS = {
@@ -48,12 +29,9 @@ OF_STATE = {
     "control": control, "commutation": commutation,
 }  # fmt: skip
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
-SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
-SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 BACK_EMF = 2  # driver of the electrical equations: speed times the shape
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
-BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 
 
@@ -80,14 +58,16 @@ class ReferenceActuator:
         self.large = sum(r.size for r in self.recordings.values()) > LARGE
         self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in self.catalogue.items() if k not in exclude}
-        self.parameters = self._nuisances()
-        self.units = [self._unit(e) for e in self.effects.values() if e.id != "speed_quantisation"]
-        self.units += self._forms()
+        self.parameters = nuisances(actuator, self.catalogue, self.recordings)
+        self.units = [
+            unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
+        ]
+        self.units += measuring_chain(list(self.recordings))
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)
         for effect in self.catalogue.values():  # one left out of the library is off
-            for name, q in _internal(effect, actuator).items():
+            for name, q in internal(effect, actuator).items():
                 full = f"{effect.id}.{name}"
                 if full not in self.parameters and effect.id not in self.effects:
                     self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
@@ -96,95 +76,6 @@ class ReferenceActuator:
         """Functions of a remainder or an own form that go along one coordinate; none of the controller's equations."""
         return () if equation in SETTINGS else ALONG
 
-    # ---- parameters
-    def _nuisances(self) -> dict[str, Parameter]:
-        a = self.actuator
-        out: dict[str, Parameter] = {}
-        for effect in self.catalogue.values():
-            for name, p in effect.parameters.items():
-                if p.tolerance > 0.0:
-                    centre = getattr(a, p.follows) if p.follows else p.nominal
-                    full = f"{effect.id}.{name}"
-                    out[full] = Parameter(
-                        full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
-                    )
-        for name in ("position_gain", "speed_gain", "speed_integral_gain", "speed_limit"):
-            at = getattr(a, name)
-            out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
-        full = "controller.commutation_time"
-        out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
-        passing = scale("passing_time", a)
-        full = "controller.commutation_slope"
-        out[full] = Parameter(full, 4e-6 * passing, 4e-6 * passing, 1e-5 * passing, "s/A")
-        for name, sd, units in (
-            ("speed", 1e-5, "s"),
-            ("power", 1e-5 * passing, "s/A"),
-            *((f"time_{j}", 1e-6, "s") for j in "abc"),
-        ):
-            full = f"controller.commutation_{name}"
-            out[full] = Parameter(full, 0.0, 0.0, sd, units)
-        unknown = False
-        for name, rec in self.recordings.items():
-            out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
-            for channel in ("voltage", "current"):
-                full = f"skew.{channel}@{name}"
-                out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
-            out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO / a.gear_ratio, "rad")
-            full = f"controller.timing@{name}"
-            out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
-            if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
-                for j in PER_PHASE:
-                    full = f"rounded.{j}@{name}"
-                    out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
-            for j in PER_PHASE if rec.current_end is None else ():
-                out[f"ends.{j}@{name}"] = Parameter(f"ends.{j}@{name}", 0.0, 0.0, CURVATURE, "1")
-            for j in PER_PHASE:
-                full = f"controller.edge_{j}@{name}"
-                out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
-            if rec.health == "seeded":
-                for f in FAULTS:  # how large a bench seeds them is not known beforehand
-                    common = _fault(SEEDED + f, f)
-                    out[SEEDED + f] = replace(common, sd=common.sd * np.sqrt(SHARED))
-                    own = common.sd * np.sqrt(1.0 - SHARED)
-                    out[f"{f}@{name}"] = replace(common, name=f"{f}@{name}", mean=0.0, sd=own)
-            elif rec.health == "healthy":
-                for f in FAULTS:
-                    out[f"{f}@{name}"] = Parameter(f"{f}@{name}", 0.0, 0.0, 0.5 * HEALTHY, "1")
-            else:
-                unknown = True
-        if unknown:
-            for f in FAULTS:
-                out[f] = replace(_fault(f, f), absent=0.5 * HEALTHY)
-        return out
-
-    def _unit(self, effect: Effect) -> Unit:
-        parameters, positive = [], []
-        if effect.kind == "calibration":
-            for name, p in effect.parameters.items():
-                full = f"{effect.id}.{name}"
-                base = self.parameters[full]
-                width = _width(p.nominal, p.low, p.high) * (base.off / p.nominal)
-                parameters.append(
-                    Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off))
-                )
-            hole = [OUTSIDE * self.parameters[p.alias or ""].sd / p.sd for p in parameters]
-            return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), min(hole), hole)])
-        internal = _internal(effect, self.actuator)
-        for name, q in internal.items():
-            full = f"{effect.id}.{name}"
-            parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units, vanishes=_vanishes(q.off)))
-            positive.append(_sign(effect, name, q.off))
-        shapes = _shapes(effect, self.actuator)
-        least = max((0.5 * _nearest(effect, n) / q.sd for n, q in internal.items()), default=0.0)
-        variants = [Variant(parameters, positive, least)] if not shapes else []
-        for n, shape in enumerate(shapes):
-            full = f"{effect.id}#{n}"
-            near = (n > 0 and effect.id != "stribeck") or effect.id == "compliance"
-            mean, sd = (1.0, 0.5) if near else (0.0, 2.0)
-            parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
-            variants.append(Variant([parameter], [0 if near else 1]))
-        return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
-
     def observed(self) -> dict[str, dict[str, float]]:
         """Effects that the recordings show for certain, with their parameters: a speed that lies on a lattice."""
         steps = [r.speed_step for r in self.recordings.values()]
@@ -192,31 +83,6 @@ class ReferenceActuator:
         if "speed_quantisation" in self.effects and min(steps) >= 0.5 * least:
             return {"speed_quantisation": {"step": float(np.median(steps))}}
         return {}
-
-    def _forms(self) -> list[Unit]:
-        out = []
-        for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
-            variants = [
-                Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
-                for side in ("late", "early")
-            ]
-            out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
-        pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
-        # one pair: what both others add to a phase together is a gain, for the three add up to nothing
-        variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
-        out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
-        for channel in ("voltage", "current"):
-            of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
-            variants = [Variant([Parameter(f"curve.{c}", 0.0, 0.0, BEND, "1")]) for c in of]
-            out.append(Unit(f"~curve_{channel}", "form", (f"sensor_{channel}",), variants, among=2.0))
-        for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
-            for j in PER_PHASE:
-                parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in self.recordings]
-                drift = Unit(
-                    f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0
-                )
-                out.append(drift)
-        return out
 
     # ---- equations
     def prepare(self, name: str) -> None:
@@ -229,7 +95,8 @@ class ReferenceActuator:
         torque.residual(noisy)
         for equation in (e for n, e in self._along if n == name and e not in SETTINGS):
             along = self._along[name, equation]
-            along["changes"] = (np.array(self._drivers(noisy, equation)) - along["drivers"]).astype(np.float32)
+            changed = np.array(drivers_of(noisy, equation, self._functions_of(noisy.rec)))
+            along["changes"] = (changed - along["drivers"]).astype(np.float32)
 
     def _noisy(self, name: str) -> Signals:
         """A recording with one more draw of the sensors' noise."""
@@ -380,7 +247,7 @@ class ReferenceActuator:
         """What the rows of an equation lie along, and a remainder's drivers, at the first point: they hardly move."""
         key = state.rec.name, equation
         if key not in self._along:
-            self._along[key] = self._new_coordinates(state, equation)
+            self._along[key] = coordinates_of(state, equation, self._functions_of(state.rec))
         return self._functions_of(state.rec) | self._along[key]
 
     def _functions_of(self, rec: Signals) -> dict[str, Any]:
@@ -388,99 +255,8 @@ class ReferenceActuator:
         if rec.name not in self._functions:
             if self.large:
                 self._functions.clear()
-            self._functions[rec.name] = self._new_functions(rec.rows_from)
+            self._functions[rec.name] = functions_of(rec.rows_from)
         return self._functions[rec.name]
-
-    def _new_functions(self, rec: Signals) -> dict[str, Any]:
-        w = rec.speed / 100.0
-        level = np.abs(rec.current).sum(axis=1) / 4.0
-        t = rec.time / rec.time[-1] - 0.5
-        x = rec.actuator.pole_pairs * rec.middle
-        direction = np.where(rec.moving, rec.direction, 0.0)  # at rest its sign is the noise's
-        base = {
-            "direction": direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
-            "rotor_angle": np.mod(rec.middle, 2 * np.pi), "angle": rec.middle, "output_angle": rec.shaft,
-            "temperature": np.full(rec.size, rec.ambient),
-        }  # fmt: skip
-        phi = [
-            np.ones(rec.size), direction, np.abs(w), w * w, level - 0.3, t,
-            np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
-            np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle),
-            np.full(rec.size, rec.dT_measured / 50.0),
-            np.exp(-np.abs(rec.speed) / 8.0), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
-        ]  # fmt: skip
-        return {**base, "phi": np.array(phi)}
-
-    def _new_coordinates(self, state: State, equation: str) -> dict[str, Any]:
-        """What is an equation's own: the drivers that a coefficient would multiply, and where its rows are not the
-        samples, what they lie along; (row,) each."""
-        rec = state.rec
-        base = dict(self._functions_of(rec))
-        phi = list(base.pop("phi"))
-        kinds: dict[str, Any] = {
-            "slow": SLOW_FUNCTIONS,
-            "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
-            "drivers": np.array(self._drivers(state, equation)),
-        }
-        of = rows_of(state, equation)
-        if equation == "torque":
-            # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
-            kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}
-        if equation == "control":
-            phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
-        elif equation.startswith("electrical") and of is not None:
-            # what means over runs leave of ripple and commutations beats with both
-            kinds |= {"highest_order": 0.5 * rec.actuator.pole_pairs, "highest_frequency": BEATS / electrical.RUN}
-        if of is None:
-            return kinds
-        along = {k: of(v) for k, v in base.items()}
-        return {
-            **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": np.array([of(f) for f in phi]), **kinds,
-        }  # fmt: skip
-
-    def _drivers(self, state: State, equation: str) -> list[np.ndarray]:
-        """(row,) each of the quantities that a coefficient of an equation multiplies, the first of them 1."""
-        rec = state.rec
-        out = [np.ones(rec.size)]
-        if equation.startswith("electrical"):
-            j = "abc".index(equation[-1])
-            out += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
-        elif equation == "torque":  # friction, torque constant, inertia
-            typical = typical_torque(rec.actuator)
-            out += [rec.direction, state.drive / typical, state.net / typical]
-        elif equation == "sensor_speed":  # at rest the angle's rate is its noise, which the residual has too
-            out += [np.where(rec.moving, rec.speed / 100.0, 0.0)]
-        elif equation == "sensor_current":
-            balanced = rec.current - rec.current.mean(axis=1, keepdims=True)
-            out += [balanced[:, j] for j in range(2)]
-        elif equation == "bus":
-            out += [state.bus_current]
-        elif equation == "position":
-            out += [self._functions_of(rec)["direction"], rec.acceleration / 1e3]
-        of = rows_of(state, equation)
-        if of is not None:
-            out = [of(d) for d in out]
-        return [*out, control.late(state)] if equation == "control" else out
-
-
-def typical_torque(actuator: ActuatorParameters) -> float:
-    """Torque of two phases at a tenth of the current limit (N m)."""
-    return 0.2 * actuator.back_emf * actuator.current_limit
-
-
-def rows_of(state: State, equation: str) -> Callable[[np.ndarray], np.ndarray] | None:
-    """What an equation's rows have of a signal (sample,); None where they are the samples."""
-    rec = state.rec
-    if equation == "control":
-        width = control.block_length(rec)
-        return rows_at((np.arange(rec.size // width - 1) + 1) * width)
-    if equation == "torque":
-        return torque.two_intervals
-    if equation == "commutation":
-        return rows_at(np.concatenate([commutation.rows_of(state, j) for j in range(3)]))
-    if equation.startswith("electrical") and rec.current_end is None:
-        return electrical.averaging(state, "abc".index(equation[-1]))
-    return None
 
 
 def _known(state: State, equation: str) -> np.ndarray | bool:
@@ -490,11 +266,6 @@ def _known(state: State, equation: str) -> np.ndarray | bool:
         return True
     of = rows_of(state, equation)
     return ~lost if of is None else of(lost) == 0.0
-
-
-def rows_at(rows: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Picks rows of a signal."""
-    return lambda x: x[rows]
 
 
 def _acts(unit: Unit, equation: str) -> bool:
@@ -512,69 +283,3 @@ def _not_first(rec: Signals) -> np.ndarray:
     out = np.ones(rec.size, bool)
     out[0] = out[-1] = False
     return out
-
-
-def _fault(full: str, component: str) -> Parameter:
-    turns = component.startswith("N")
-    if turns:  # the winding's turns are what is left of them
-        return Parameter(full, 0.0, 0.03, 0.05, "1", vanishes=1.0)
-    return Parameter(full, 0.0, 0.0, 0.1, "1")
-
-
-def _vanishes(off: float) -> float | None:
-    """Zero, where a parameter multiplies: one that is not zero when it is off."""
-    return 0.0 if off != 0.0 else None
-
-
-def _nearest(effect: Effect, name: str) -> float:
-    """Distance from off at which a parameter's realistic range begins."""
-    p = effect.parameters.get(name)
-    return max(p.low - p.nominal, p.nominal - p.high, 0.0) if p is not None else 0.0
-
-
-def _width(nominal: float, low: float, high: float) -> float:
-    return 0.6 * max(abs(high - nominal), abs(low - nominal))
-
-
-class _Internal:
-    def __init__(self, off: float, mean: float, sd: float, units: str):
-        self.off, self.mean, self.sd, self.units = off, mean, sd, units
-
-
-def _internal(effect: Effect, actuator: ActuatorParameters) -> dict[str, _Internal]:
-    """Parameters that an effect is fitted in, with their priors."""
-    own = getattr(TERMS[effect.id], "PARAMETERS", None)
-    if own is not None:
-        out = {}
-        for n, numbers in own.items():
-            off, mean, sd = (_factor(effect, n, actuator) * x for x in numbers)
-            out[n] = _Internal(off, mean, sd, "")
-        return out
-    return {
-        n: _Internal(p.nominal, p.nominal, _width(p.nominal, p.low, p.high), p.units)
-        for n, p in effect.parameters.items()
-    }
-
-
-def _factor(effect: Effect, name: str, actuator: ActuatorParameters) -> float:
-    """What a number of an effect's own terms is multiplied by for this actuator."""
-    return scale(getattr(TERMS[effect.id], "SCALES", {}).get(name, ""), actuator)
-
-
-def _shapes(effect: Effect, actuator: ActuatorParameters) -> list[dict[str, float]]:
-    """Values of its parameters at which a secant is taken where no derivative at "off" exists."""
-    given = getattr(TERMS[effect.id], "SHAPES", ())
-    return [{n: _factor(effect, n, actuator) * x for n, x in shape.items()} for shape in given]
-
-
-def _sign(effect: Effect, name: str, off: float) -> int:
-    """+1 or -1 where a parameter's range lies on one side of where the fit has it off, which need not be the
-    catalogue's nominal value."""
-    p = effect.parameters.get(name)
-    if p is None:
-        return 1 if name in ("heating_rate", "flexibility") else 0
-    if p.low >= off and p.high > off:
-        return 1
-    if p.high <= off and p.low < off:
-        return -1
-    return 0

@@ -19,7 +19,8 @@ from ..diagnosis.evidence import Normal
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.search import Model, Search
 from ..io.recording import Recording
-from .machine import FAULTS, ReferenceActuator
+from .machine import ReferenceActuator
+from .parameters import FAULTS
 from .signals import Signals
 
 INTERVAL = 2e-4  # s

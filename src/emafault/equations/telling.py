@@ -10,7 +10,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
 from .acquisition import full_range
-from .machine import SWEPT, typical_torque
+from .coordinates import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval

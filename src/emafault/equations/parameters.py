@@ -1,0 +1,216 @@
+"""What the equations are fitted in: nuisances, effects and faults of the measuring chain, with their priors."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.model import Parameter, Unit, Variant
+from ..effects import Effect
+from ..effects.scaling import scale
+from .point import SEEDED
+from .signals import REST, Signals
+from .terms import TERMS
+
+FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
+HEALTHY = 1e-3
+SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
+EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
+ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
+TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
+CURVATURE = 10.0  # times a smooth current's, by which a current at an interval's end is off its neighbours' mean
+LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
+BEND = 0.03  # of a channel's full range, that its curve may be off by there
+SKEW = 1e-6  # s, by which channels may be sampled apart
+SOAK = 0.5  # K, of the measured ambient temperature
+GAIN_PRIOR = 0.3  # relative, of the controller's gains
+OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
+PER_PHASE = ("a", "b", "c")
+
+
+def nuisances(
+    a: ActuatorParameters, catalogue: Mapping[str, Effect], recordings: Mapping[str, Signals]
+) -> dict[str, Parameter]:
+    """What is free whatever the cause: tolerances, settings of the controller, soak temperatures, the fault vector."""
+    out: dict[str, Parameter] = {}
+    for effect in catalogue.values():
+        for name, p in effect.parameters.items():
+            if p.tolerance > 0.0:
+                centre = getattr(a, p.follows) if p.follows else p.nominal
+                full = f"{effect.id}.{name}"
+                out[full] = Parameter(
+                    full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
+                )
+    for name in ("position_gain", "speed_gain", "speed_integral_gain", "speed_limit"):
+        at = getattr(a, name)
+        out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
+    full = "controller.commutation_time"
+    out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
+    passing = scale("passing_time", a)
+    full = "controller.commutation_slope"
+    out[full] = Parameter(full, 4e-6 * passing, 4e-6 * passing, 1e-5 * passing, "s/A")
+    for name, sd, units in (
+        ("speed", 1e-5, "s"),
+        ("power", 1e-5 * passing, "s/A"),
+        *((f"time_{j}", 1e-6, "s") for j in "abc"),
+    ):
+        full = f"controller.commutation_{name}"
+        out[full] = Parameter(full, 0.0, 0.0, sd, units)
+    unknown = False
+    for name, rec in recordings.items():
+        out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
+        for channel in ("voltage", "current"):
+            full = f"skew.{channel}@{name}"
+            out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
+        out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO / a.gear_ratio, "rad")
+        full = f"controller.timing@{name}"
+        out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
+        if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
+            for j in PER_PHASE:
+                full = f"rounded.{j}@{name}"
+                out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
+        for j in PER_PHASE if rec.current_end is None else ():
+            out[f"ends.{j}@{name}"] = Parameter(f"ends.{j}@{name}", 0.0, 0.0, CURVATURE, "1")
+        for j in PER_PHASE:
+            full = f"controller.edge_{j}@{name}"
+            out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
+        if rec.health == "seeded":
+            for f in FAULTS:  # how large a bench seeds them is not known beforehand
+                common = _fault(SEEDED + f, f)
+                out[SEEDED + f] = replace(common, sd=common.sd * np.sqrt(SHARED))
+                own = common.sd * np.sqrt(1.0 - SHARED)
+                out[f"{f}@{name}"] = replace(common, name=f"{f}@{name}", mean=0.0, sd=own)
+        elif rec.health == "healthy":
+            for f in FAULTS:
+                out[f"{f}@{name}"] = Parameter(f"{f}@{name}", 0.0, 0.0, 0.5 * HEALTHY, "1")
+        else:
+            unknown = True
+    if unknown:
+        for f in FAULTS:
+            out[f] = replace(_fault(f, f), absent=0.5 * HEALTHY)
+    return out
+
+
+def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Parameter]) -> Unit:
+    """An effect as a candidate cause; ``known``: the nuisances, of which a unit's calibration is another value."""
+    parameters, positive = [], []
+    if effect.kind == "calibration":
+        for name, p in effect.parameters.items():
+            full = f"{effect.id}.{name}"
+            base = known[full]
+            width = _width(p.nominal, p.low, p.high) * (base.off / p.nominal)
+            parameters.append(Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off)))
+        hole = [OUTSIDE * known[p.alias or ""].sd / p.sd for p in parameters]
+        return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), min(hole), hole)])
+    own = internal(effect, actuator)
+    for name, q in own.items():
+        full = f"{effect.id}.{name}"
+        parameters.append(Parameter(full, q.off, q.mean, q.sd, q.units, vanishes=_vanishes(q.off)))
+        positive.append(_sign(effect, name, q.off))
+    shapes = _shapes(effect, actuator)
+    least = max((0.5 * _nearest(effect, n) / q.sd for n, q in own.items()), default=0.0)
+    variants = [Variant(parameters, positive, least)] if not shapes else []
+    for n, shape in enumerate(shapes):
+        full = f"{effect.id}#{n}"
+        near = (n > 0 and effect.id != "stribeck") or effect.id == "compliance"
+        mean, sd = (1.0, 0.5) if near else (0.0, 2.0)
+        parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
+        variants.append(Variant([parameter], [0 if near else 1]))
+    return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
+
+
+def measuring_chain(recordings: Collection[str]) -> list[Unit]:
+    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drift."""
+    out = []
+    for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
+        variants = [
+            Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
+            for side in ("late", "early")
+        ]
+        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
+    pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
+    # one pair: what both others add to a phase together is a gain, for the three add up to nothing
+    variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
+    out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
+    for channel in ("voltage", "current"):
+        of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
+        variants = [Variant([Parameter(f"curve.{c}", 0.0, 0.0, BEND, "1")]) for c in of]
+        out.append(Unit(f"~curve_{channel}", "form", (f"sensor_{channel}",), variants, among=2.0))
+    for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
+        for j in PER_PHASE:
+            parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]
+            drift = Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0)
+            out.append(drift)
+    return out
+
+
+def _fault(full: str, component: str) -> Parameter:
+    turns = component.startswith("N")
+    if turns:  # the winding's turns are what is left of them
+        return Parameter(full, 0.0, 0.03, 0.05, "1", vanishes=1.0)
+    return Parameter(full, 0.0, 0.0, 0.1, "1")
+
+
+def _vanishes(off: float) -> float | None:
+    """Zero, where a parameter multiplies: one that is not zero when it is off."""
+    return 0.0 if off != 0.0 else None
+
+
+def _nearest(effect: Effect, name: str) -> float:
+    """Distance from off at which a parameter's realistic range begins."""
+    p = effect.parameters.get(name)
+    return max(p.low - p.nominal, p.nominal - p.high, 0.0) if p is not None else 0.0
+
+
+def _width(nominal: float, low: float, high: float) -> float:
+    return 0.6 * max(abs(high - nominal), abs(low - nominal))
+
+
+@dataclass(frozen=True)
+class Internal:
+    """A parameter that an effect is fitted in: its value when off, its prior's mean and standard deviation."""
+
+    off: float
+    mean: float
+    sd: float
+    units: str
+
+
+def internal(effect: Effect, actuator: ActuatorParameters) -> dict[str, Internal]:
+    """Parameters that an effect is fitted in, with their priors."""
+    own = getattr(TERMS[effect.id], "PARAMETERS", None)
+    if own is not None:
+        out = {}
+        for n, numbers in own.items():
+            off, mean, sd = (_factor(effect, n, actuator) * x for x in numbers)
+            out[n] = Internal(off, mean, sd, "")
+        return out
+    return {
+        n: Internal(p.nominal, p.nominal, _width(p.nominal, p.low, p.high), p.units)
+        for n, p in effect.parameters.items()
+    }
+
+
+def _factor(effect: Effect, name: str, actuator: ActuatorParameters) -> float:
+    """What a number of an effect's own terms is multiplied by for this actuator."""
+    return scale(getattr(TERMS[effect.id], "SCALES", {}).get(name, ""), actuator)
+
+
+def _shapes(effect: Effect, actuator: ActuatorParameters) -> list[dict[str, float]]:
+    """Values of its parameters at which a secant is taken where no derivative at "off" exists."""
+    given = getattr(TERMS[effect.id], "SHAPES", ())
+    return [{n: _factor(effect, n, actuator) * x for n, x in shape.items()} for shape in given]
+
+
+def _sign(effect: Effect, name: str, off: float) -> int:
+    """+1 or -1 where a parameter's range lies on one side of where the fit has it off, which need not be the
+    catalogue's nominal value."""
+    p = effect.parameters.get(name)
+    if p is None:
+        return 1 if name in ("heating_rate", "flexibility") else 0
+    if p.low >= off and p.high > off:
+        return 1
+    if p.high <= off and p.low < off:
+        return -1
+    return 0
