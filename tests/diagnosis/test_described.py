@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import another_form_of
+from emafault.diagnosis.described import Described, another_form_of, curve, with_forms
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Choice, Model, Search
@@ -97,3 +97,14 @@ def test_what_a_listed_effect_could_be_is_no_form(sizes, found):
     bench._describe("first")
     assert {d.id for d in bench.described if d.word == "frequency"} == found
     assert all(d.values["frequency"] == pytest.approx(21.3, abs=0.1) for d in bench.described if d.id in found)
+
+
+@pytest.mark.parametrize(("size", "bins"), [(0.5, 30), (0.055, 15), (0.02, 8)])
+def test_a_picture_has_no_more_bins_than_show_more_than_their_errors(size, bins):
+    form = Described("~f", "frequency", "torque", 0, (("frequency", 21.3, 0.01, "Hz"),), 1.0, 1.0)
+    machine = with_forms(Wave((0.0, size)), [form])
+    values = {"load.T": 0.0} | {f"form.~f.{c}@{r}": -size * (c == "sine") for r in "abc" for c in ("cosine", "sine")}
+    blocks = [b for r in Wave.recordings for b in machine.blocks(values, r)]
+    white = Weights(np.ones(ROWS, bool), np.zeros(0), np.ones(ROWS))
+    found = curve(machine, form, blocks, {r: {"torque": white} for r in Wave.recordings}, values)
+    assert len(found["x"]) == len(found["before"]) == len(found["error"]) == bins
