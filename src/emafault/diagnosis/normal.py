@@ -108,9 +108,9 @@ class NormalEquations(Point):
     def _workers(self) -> Workers:
         """Processes that share the machine as it is at the first call."""
         if self.workers is None:
-            several = min(self.processes, len(self.recordings))
+            several, values = min(self.processes, len(self.recordings)), self.values()
             for name in self.recordings if several > 1 else ():
-                self.machine.prepare(name)
+                self.machine.prepare(name, values)
             if several > 1:
                 Linearisation.load()
             self.workers = Workers(self, Linearisation(self.machine), several)

@@ -33,6 +33,8 @@ def voltages(state: State) -> list[Dual]:
     state.rise, state.inductance = [], []
     for j in range(3):
         flux = state.current_end[j]
+        if rec.current_end is None:  # to the ripple, by which it is off, its own errors are nothing
+            flux = Dual(flux.value)
         for m in with_hook("flux"):
             flux = m.flux(state.p.of(effect_name(m)), flux)
         L: Dual | float = a.inductance
@@ -44,7 +46,7 @@ def voltages(state: State) -> list[Dual]:
         if rec.current_end is None:
             across = _runs(state, j).across
             rise = Dual(rise.value, {n: np.where(across, s, 0.0) for n, s in rise.slopes.items()})
-            rise = rise + state.p(f"ends.{'abc'[j]}@{rec.name}") * _by_curvature(state, j)
+            rise = rise + state.p(f"ends.{'abc'[j]}@{rec.name}") * np.where(across, 0.0, _by_curvature(state, j))
         state.rise.append(rise)
         back_emf = np.asarray(value_of(state.k[j] * state.swept[j]))
         by_calm = state.k[j] * state.regressor[j]
@@ -119,10 +121,9 @@ class Runs:
         """(run,) of (interval,)."""
         return np.add.reduceat(np.asarray(x, float)[self.rows], self.starts) / self.lengths
 
-    def at_ends(self, x: np.ndarray) -> np.ndarray:
-        """(run,) sum over its two ends of what stands (interval,) at the end of each interval."""
-        first, last = self.rows[self.starts], self.rows[self.starts + self.lengths - 1]
-        return x[first - 1] + x[last]
+    def beside(self, x: np.ndarray) -> np.ndarray:
+        """(run,) sum over the intervals before and after each run of (interval,)."""
+        return x[self.rows[self.starts] - 1] + x[self.rows[self.starts + self.lengths - 1] + 1]
 
 
 def averaging(state: State, j: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -185,14 +186,10 @@ def switched_on(state: State, j: int) -> np.ndarray:
     return rec.once(("switched_on", j), lambda: binary_dilation(_conducts(rec, j), iterations=BESIDE))
 
 
-def conducts_after(state: State, j: int) -> np.ndarray:
-    """(sample,) where phase j conducts at any time of an interval or of the next."""
+def conducts(state: State, j: int) -> np.ndarray:
+    """(sample,) where phase j conducts at any time of an interval."""
     rec = state.rec.rows_from
-    return rec.once(("conducts_after", j), lambda: _either(_conducts(rec, j)))
-
-
-def _either(x: np.ndarray) -> np.ndarray:
-    return x | np.append(x[1:], x[-1:])
+    return rec.once(("conducts", j), lambda: _conducts(rec, j))
 
 
 def _conducts(rec, j: int) -> np.ndarray:
@@ -215,7 +212,7 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
         bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:])) / 6.0
         ripple = a.hysteresis**2 / 3.0
         between = 2.0 * of(switched_on(state, j) * ripple + bend**2)
-        across = runs.at_ends(conducts_after(state, j) * ripple + bend**2)
+        across = runs.beside(conducts(state, j) * ripple + bend**2)
         ends = (state.inductance[j] / rec.interval / lengths) ** 2 * np.where(runs.crosses, across, between)
         unknown = np.where(runs.crosses, 0.0, UNKNOWN * of(np.asarray(value_of(state.rise[j])))) ** 2
         return [(white + 2.0 * of(angle) / lengths) / lengths + ends + unknown]

@@ -85,12 +85,12 @@ class ReferenceActuator:
         return {}
 
     # ---- equations
-    def prepare(self, name: str) -> None:
-        """Compute once what does not depend on the point, or hardly: coordinates and drivers are those at "off"."""
+    def prepare(self, name: str, values: Mapping[str, float]) -> None:
+        """Compute once what does not depend on the point, or hardly: coordinates and drivers are those of the first."""
         if (name, "torque") in self._along:
             return
-        point = Point({n: p.off for n, p in self.parameters.items()}, name, ())
-        self._recording(point.values, self.recordings[name], ())
+        point = Point(values, name, ())
+        self._recording(values, self.recordings[name], ())
         noisy = State(self._noisy(name), point)
         torque.residual(noisy)
         for equation in (e for n, e in self._along if n == name and e not in SETTINGS):
@@ -123,7 +123,7 @@ class ReferenceActuator:
         ``disturbed`` takes the recording with one more draw of the sensors' noise; ``less`` is what a channel has too
         much, (sample,).
         """
-        self.prepare(name)
+        self.prepare(name, values)
         rec = self._noisy(name) if disturbed else self.recordings[name]
         return self._recording(values, _less(rec, less or {}), wanted)
 
@@ -152,7 +152,7 @@ class ReferenceActuator:
         off = {n: p.off for n, p in self.parameters.items()}
         if place.startswith("k_"):
             return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
-        self.prepare(name)
+        self.prepare(name, off)
         before = self._recording(off, rec, ())
         step = self.place(place, "")[1] / STANDS_OUT
         found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}

@@ -86,7 +86,7 @@ class Recorded:
         return Unit(effect.id, "structural", effect.equations, variants, Variant(own, signs))
 
     # ---- equations
-    def prepare(self, name: str) -> None:
+    def prepare(self, name: str, values: Mapping[str, float]) -> None:
         """Nothing depends on the point alone."""
 
     def blocks(
