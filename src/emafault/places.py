@@ -14,7 +14,7 @@ from .errors import InputError, shown
 
 LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes
 LONGEST_STEM = 150  # characters of a name that is made of another
-TEMPORARY = 25  # bytes that the name of a file has more while it is written
+TEMPORARY = 45  # bytes that the name of a file has more while it is written
 
 
 def kind(path: str | Path, what: str = "") -> str:

@@ -1,6 +1,7 @@
 """Processes: which one is at work on something, whether it still is, and children that end with their parent."""
 
 import ctypes
+import hashlib
 import os
 import signal
 import socket
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_DIGITS = 9  # of the number of a process, at most
 
 
 def this_process() -> list:
@@ -21,7 +23,9 @@ def started(pid: int) -> str | None:
     try:
         os.kill(pid, 0)
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
-    except (ProcessLookupError, FileNotFoundError):
+    except ProcessLookupError:
+        return None
+    except FileNotFoundError:
         return None if Path("/proc/self/stat").exists() else "alive"
     except OSError:
         return "alive"
@@ -31,6 +35,24 @@ def still_there(process: Sequence) -> bool | None:
     """Whether what ``this_process`` gave is still running; None of another host, where that cannot be asked."""
     host, pid, start = process
     return started(pid) == start if host == socket.gethostname() else None
+
+
+def mark() -> str:
+    """What ``this_process`` gives as a part of a file's name, with a digest in the place of the host's name."""
+    _, pid, start = this_process()
+    return f"{pid}-{start}-{_host_digest()}"
+
+
+def marked_still_there(given: str) -> bool | None:
+    """Whether the process whose ``mark`` is given is still running; None of another host, or where it is no mark."""
+    pid, _, rest = given.partition("-")
+    start, _, host = rest.partition("-")
+    known = pid.isascii() and pid.isdigit() and len(pid) <= _DIGITS and host == _host_digest()
+    return started(int(pid)) == start if known else None
+
+
+def _host_digest() -> str:
+    return hashlib.sha256(os.fsencode(socket.gethostname())).hexdigest()[:8]
 
 
 def end_with(parent: int) -> None:

@@ -6,12 +6,12 @@ import fcntl
 import functools
 import hashlib
 import json
-import os
 import sys
 from pathlib import Path
 from typing import IO, Any
 
 from .errors import InputError
+from .io.atomic import write_text
 from .paths import CACHE, EFFECTS, PACKAGE
 
 _KNOWN = CACHE / "sources.json"  # digest of a source's bytes -> what it means and imports, since parsing takes seconds
@@ -90,12 +90,8 @@ def _known_sources() -> dict[str, list[Any]]:
 
 def keep_known_sources() -> None:
     """Keep what was parsed for the next call; what cannot be kept is parsed again."""
-    temporary = _KNOWN.with_name(f".{_KNOWN.name}.{os.getpid()}.part")
-    with contextlib.suppress(OSError):
-        _KNOWN.parent.mkdir(parents=True, exist_ok=True)
-        used = dict(list(_known_sources().items())[-_MOST:])
-        temporary.write_text(json.dumps(used))
-        os.replace(temporary, _KNOWN)
+    with contextlib.suppress(InputError):
+        write_text(_KNOWN, json.dumps(dict(list(_known_sources().items())[-_MOST:])))
 
 
 def _meaning(tree: ast.AST) -> str:

@@ -5,13 +5,16 @@ import errno
 import glob
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import InputError, shown
 from ..places import refuse_irregular
+from ..processes import mark, marked_still_there
 
 _FULL = 2**20  # bytes; a disk with less is a full one
+_ABANDONED = 24 * 3600.0  # s without a change, after which a half file of another host's process is left over
 
 
 def replace_atomically(path: Path, write) -> None:
@@ -22,7 +25,7 @@ def replace_atomically(path: Path, write) -> None:
     InputError : a link, a device or a folder stands there, the folder cannot be written or the disk is full
     """
     refuse_irregular(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = _half(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(path)
@@ -40,15 +43,30 @@ def replace_atomically(path: Path, write) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def _half(path: Path, word: str = "") -> Path:
+    """The name under which this process writes ``path``; ``places.TEMPORARY`` is how much longer it is at most."""
+    return path.with_name(f".{path.name}{word}.{mark()}.part")
+
+
 def _remove_abandoned(path: Path) -> None:
     """Remove what processes that were killed while writing ``path`` left behind."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
-        process = part.suffixes[-2].removeprefix(".")
-        if process.isdigit() and not Path(f"/proc/{process}").exists():
-            if part.is_dir():
-                shutil.rmtree(part, ignore_errors=True)
-            else:
-                part.unlink(missing_ok=True)
+        if not _abandoned(part):
+            continue
+        if part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
+        else:
+            part.unlink(missing_ok=True)
+
+
+def _abandoned(part: Path) -> bool:
+    """Whether nobody writes to a half file: its process is gone, or, of another host, it is old."""
+    there = marked_still_there(part.suffixes[-2].removeprefix("."))
+    if there is not None:
+        return not there
+    with contextlib.suppress(FileNotFoundError):
+        return time.time() - part.stat().st_mtime > _ABANDONED
+    return False
 
 
 @contextlib.contextmanager
@@ -64,7 +82,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise InputError(f"{shown(path)}: is no folder, accepted is a folder or nothing")
-    temporary, old = (path.with_name(f".{path.name}{word}.{os.getpid()}.part") for word in ("", ".old"))
+    temporary, old = _half(path), _half(path, ".old")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(path)
