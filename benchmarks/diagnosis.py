@@ -34,12 +34,13 @@ TICK = os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True)
 class Case:
-    """A bench to be simulated: number of recordings, their length (s), effects and commands."""
+    """A bench to be simulated: number of recordings, their length (s), effects, commands, and whether it is healthy."""
 
     count: int
     length: float
     effects: tuple[str, ...] = ()
     commands: tuple[str, ...] = USUAL
+    healthy: bool = False
 
 
 CASES = {
@@ -74,7 +75,8 @@ def simulate_bench(folder: Path, case: Case) -> int:
         changes = [f"command={case.commands[n % len(case.commands)]}", f"recording.duration={case.length}"]
         composed = config.compose("paper", [*changes, "unit=tolerance", *case.effects])
         spec = config.dataset_spec(composed, "fresh") | {"seed": n, "unit_seed": 1}
-        fault = np.array([0.01, 0.0, 0.0, 0.0, 0.01, TEMPERATURES[n % len(TEMPERATURES)] - 20.0])
+        seeded = 0.0 if case.healthy else 0.01
+        fault = np.array([seeded, 0.0, 0.0, 0.0, seeded, TEMPERATURES[n % len(TEMPERATURES)] - 20.0])
         recording = simulate_recording(spec, fault)
         write_recording(folder / f"recording_{n:02d}.nc", recording)
         samples += len(recording.time)

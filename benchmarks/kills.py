@@ -92,7 +92,7 @@ def targets(folder: Path, names: list[str]) -> dict[str, Target]:
     emafault = [sys.executable, "-m", "emafault"]
     bench, healthy = house / "bench", house / "healthy"
     simulate_bench(bench, Case(3, 1.0, ("effects.cogging.a=0.01",)))
-    simulate_bench(healthy, Case(1, 1.0))
+    simulate_bench(healthy, Case(1, 1.0, healthy=True))
     (house / "conf" / "withheld" / "own.yaml").write_text(CASES)
     given = measured(house / "measured")
     every = {
