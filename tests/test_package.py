@@ -1,17 +1,20 @@
 """The wheel by itself: it brings what it reads and needs no clone; ``.ci/wheel`` installs and uses it."""
 
+import ast
 import json
 import os
 import re
 import subprocess
 import sys
 import zipfile
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 import yaml
 
 import emafault
+from emafault import provenance
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -32,6 +35,17 @@ def test_the_version_is_the_cited_and_the_last_one():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert cited["version"] == emafault.__version__ and cited["license"] == "BSD-3-Clause"
     assert re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[0] == emafault.__version__
+
+
+def test_no_package_imports_one_that_imports_it():
+    imported = {}
+    for path in provenance.PACKAGE.rglob("*.py"):
+        own, *below = path.relative_to(provenance.PACKAGE).with_suffix("").parts
+        names = provenance._imports(ast.parse(path.read_text()), path)
+        tops = {name.split(".")[1] for name in names if name.startswith("emafault.")}
+        imported.setdefault(own if below or own != "__init__" else "", set()).update(tops - {own})
+    assert "effects" in imported["actuator"]
+    list(TopologicalSorter(imported).static_order())  # raises CycleError
 
 
 def test_a_wheel_brings_what_it_reads(installed, tmp_path):

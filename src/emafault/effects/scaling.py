@@ -7,15 +7,13 @@ its numbers are those of ``conf/actuator/reference.yaml``.
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
+from ..nominal import ActuatorParameters
 from ..paths import CONF
 from . import EFFECTS, Effect, EffectParameter
-
-if TYPE_CHECKING:
-    from ..actuator.parameters import ActuatorParameters
 
 LEAST_FRICTION = 1e-3  # of the torque at the current limit, where a machine states no dry friction
 
