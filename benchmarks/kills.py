@@ -47,7 +47,7 @@ class Target:
     house: Path
     out: Path
     kept: Callable[[Path], bool] = lambda path: True
-    longest: float = 0.9  # of the time that it takes, after which it is killed at the latest
+    longest: float = 1.1  # of the time that it takes, after which it is killed at the latest; results are written last
     reference: dict[str, bytes] = field(default_factory=dict)
 
     def start(self) -> subprocess.Popen:
