@@ -1,5 +1,7 @@
 """Every experiment composes; what does not fit is refused in one line naming key, value and what is accepted."""
 
+import shutil
+
 import pytest
 from omegaconf import OmegaConf
 
@@ -201,6 +203,10 @@ def test_a_digest_follows_the_sources_that_are_run_and_not_their_comments(tmp_pa
     (package / "unused.py").write_text("x = 2\n")
     (package / "used.py").write_text('"""Other docs."""\n# a comment\nfrom .part import inner\n')
     assert digest() == first
+    for folder in ("a", "z"):  # of scripts, which another working folder has elsewhere
+        (tmp_path / folder).mkdir()
+        moved = shutil.copy(script, tmp_path / folder / script.name)
+        assert provenance.source_digest(moved) == first
     (package / "part" / "inner.py").write_text("y = 2\n")
     assert digest() != first
 

@@ -58,7 +58,8 @@ def source_digest(script: str | Path) -> str:
         if path not in seen:
             seen[path], imported = _read_source(path)
             pending += imported
-    digest = hashlib.sha256("".join(seen[path] for path in sorted(seen)).encode())
+    ordered = sorted(seen, key=lambda path: (not path.is_relative_to(PACKAGE), path))  # wherever the script is
+    digest = hashlib.sha256("".join(seen[path] for path in ordered).encode())
     if PACKAGE / "effects" / "__init__.py" in seen:
         for path in sorted(EFFECTS.glob("*.yaml")):
             digest.update(path.read_bytes())
