@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from emafault.actuator.fixed_step import FORMS, quantise_by_truncation, simulate_fixed_step
+from emafault.actuator.fixed_step import quantise_by_truncation, simulate_fixed_step
+from emafault.actuator.forms import FORMS
 from emafault.actuator.parameters import ECCENTRICITY_LAWS, make_runs
 from emafault.actuator.simulate import simulate
 from emafault.config import reference_actuator
