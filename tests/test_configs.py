@@ -6,7 +6,9 @@ import pytest
 from omegaconf import OmegaConf
 
 from emafault import config, provenance
+from emafault.config import composition, draws, separate
 from emafault.errors import InputError
+from emafault.paths import CONF
 
 
 @pytest.mark.parametrize("experiment", config.experiments())
@@ -23,7 +25,7 @@ def test_every_experiment_composes(experiment):
 def test_every_option_of_a_group_composes(group, tmp_path):
     command = tmp_path / "command.csv"
     command.write_text("0 0\n1 0.1\n")
-    for path in (config.CONF / group).glob("*.yaml"):
+    for path in (CONF / group).glob("*.yaml"):
         extra = [f"command.path={command}"] if path.stem == "file" else []
         chosen = f"{group}=[{path.stem}]" if group == "reconstruction" else f"{group}={path.stem}"
         extra += ["search=none"] if group == "reconstruction" else []
@@ -174,7 +176,7 @@ def test_an_experiment_can_be_a_file_of_ones_own(tmp_path):
     assert plan.name == "diagnosed"
     assert config.all_effects(plan.cases[0].config) == {"stribeck": {"a": 0.01, "w_s": 4.0}}
     path.write_text("# @package _global_\neffects:\n  stribeck: {c: 0.01}\n")
-    config._compose.cache_clear()
+    composition._compose.cache_clear()
     with pytest.raises(InputError, match=r"effects\.stribeck\.c"):
         config.plan(str(path), "sampling.runs=100")
 
@@ -220,9 +222,9 @@ def test_only_the_papers_recipe_drops_the_start_and_the_bound_drops_what_no_meth
 
 def test_draws_of_blind_cases_share_none(monkeypatch):
     config.check_draws()
-    read = config._withheld_draw
+    read = draws._withheld_draw
     overlapping = {"brief": {"cases": {"T1": 5}, "first_seed": 30010}}
-    monkeypatch.setattr(config, "_withheld_draw", lambda draw: read(draw) | overlapping.get(draw, {}))
+    monkeypatch.setattr(draws, "_withheld_draw", lambda draw: read(draw) | overlapping.get(draw, {}))
     with pytest.raises(InputError, match="brief and standard share seeds 30010 to 30014 of T1"):
         config.plan()
 
@@ -243,13 +245,13 @@ def test_every_so_many_cases_of_a_draw_are_told():
     ],
 )
 def test_settings_of_the_check_of_the_evidence_are_checked(wrong, says, tmp_path, monkeypatch):
-    read = OmegaConf.load(config.CONF / "evidence.yaml")
+    read = OmegaConf.load(CONF / "evidence.yaml")
     OmegaConf.save(OmegaConf.merge(read, wrong), tmp_path / "evidence.yaml")
     spec = config.evidence_spec()
     assert spec["evidence"]["draws"] == 500 and set(spec) == {"actuator", "evidence", "sensors"}
-    monkeypatch.setattr(config, "CONF", tmp_path)
+    monkeypatch.setattr(separate, "CONF", tmp_path)
     with pytest.raises(InputError, match=says):
-        config._evidence()
+        separate.evidence()
 
 
 def test_a_shifted_variant_is_evaluated_with_the_estimators_of_another():

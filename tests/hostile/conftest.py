@@ -13,8 +13,10 @@ import pytest
 
 from emafault import closed_form, config
 from emafault.cli import main
+from emafault.config import composition, draws, separate
 from emafault.identification.identifier import fit_identifier
 from emafault.identification.settings import NetworkSettings, TrainingSettings
+from emafault.paths import CONF
 from emafault.study.networks import seed_folder, write_json, write_yaml
 
 SHORT = ("recording.duration=0.3", "recording.discard=0.05")
@@ -64,7 +66,7 @@ def whole(tmp_path_factory) -> Path:
     (folder / "bench").mkdir()
     for name in ("good", "healthy"):
         shutil.copy(folder / f"{name}.nc", folder / "bench" / f"{name}.nc")
-    shutil.copytree(config.CONF, folder / "conf")
+    shutil.copytree(CONF, folder / "conf")
     _train(folder / TRAINED)
     return folder
 
@@ -99,5 +101,6 @@ def workshop(whole, tmp_path, monkeypatch) -> Path:
     folder = tmp_path / "workshop"
     shutil.copytree(whole, folder, ignore=shutil.ignore_patterns("conf"))
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(config, "CONF", whole / "conf")  # what a test breaks here breaks no checkout
+    for reads in (composition, draws, separate):
+        monkeypatch.setattr(reads, "CONF", whole / "conf")  # what a test breaks here breaks no checkout
     return folder

@@ -3,6 +3,7 @@
 import pytest
 
 from emafault import config
+from emafault.config import composition
 from emafault.errors import InputError, one_line
 
 from . import calls, experiments, lines, recordings, saved
@@ -26,7 +27,7 @@ def test_entry(workshop, name):
     entry = CORPUS[name]
     if entry.prepare:
         entry.prepare(workshop)
-    before = state(workshop), state(config.CONF)
+    before = state(workshop), state(composition.CONF)
     said = say(list(entry.line))
     if not entry.says:
         assert said.code == 0, said.lines
@@ -35,7 +36,7 @@ def test_entry(workshop, name):
     assert said.lines[0].startswith(f"emafault {entry.line[0]}: ") and len(said.lines[0]) < 2000
     for word in entry.says:
         assert word in said.lines[0]
-    assert (state(workshop), state(config.CONF)) == before
+    assert (state(workshop), state(composition.CONF)) == before
 
 
 @pytest.mark.parametrize("name", calls.CALLS)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from emafault import config
+from emafault.config import separate
 from emafault.errors import InputError
 from emafault.study import confirmed_command
 from emafault.study.optimal_command import Design, Judge, best, demand, design_of, paper_design, search, search_command
@@ -86,13 +87,13 @@ def test_demand_of_constant_signals(judge):
 
 
 def test_settings_that_do_not_fit_are_refused(monkeypatch, tmp_path):
-    text = (config.CONF / "optimal_command.yaml").read_text()
+    text = (separate.CONF / "optimal_command.yaml").read_text()
     for old, new, says in (
         ("speed: {low: 0.02, high: 0.8}", "velocity: {low: 0.02, high: 0.8}", "velocity"),
         ("trials: 200", "trials: 1", "trials"),
         ("  ramp:", "  leap:", "leap"),
     ):
         (tmp_path / "optimal_command.yaml").write_text(text.replace(old, new))
-        monkeypatch.setattr(config, "CONF", tmp_path)
+        monkeypatch.setattr(separate, "CONF", tmp_path)
         with pytest.raises(InputError, match=says):
-            config._design()
+            separate.design()

@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> None:
         word = args.experiment
         if not (word.isascii() and word.replace("_", "").replace("-", "").isalnum()) or len(word) > LONGEST_NAME:
             raise InputError(f"--experiment: got '{shown(word)}', accepted are letters, digits, _ and -")
-        target = config.CONF / "experiment" / f"{word}.yaml"
+        target = config.experiment_path(word)
         refuse_experiment(target)
     spec = config.diagnosis_spec(config.compose(overrides=overrides))
     tracking = not args.no_tracking

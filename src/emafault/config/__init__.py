@@ -1,0 +1,106 @@
+"""Hydra configuration: composition, the sub-tree each stage reads, what a call of the workflow sets.
+
+Only this package, the command line and the Snakefile read configuration; everything else is handed one sub-tree.
+"""
+
+from .call import (
+    batch_files,
+    batches,
+    bench_files,
+    bench_name,
+    check_call,
+    command_files,
+    fleet_digest,
+)
+from .composition import (
+    GROUPS,
+    compose,
+    experiment_path,
+    experiments,
+    recursively_sorted,
+    reference_actuator,
+    refuse_unread,
+    split_overrides,
+)
+from .draws import (
+    actuator_name,
+    calibration_spec,
+    check_draws,
+    withheld_draws,
+    withheld_jobs,
+    withheld_shows_measured,
+    withheld_spec,
+)
+from .plans import (
+    SHARDS_OF_A_BLOCK,
+    plan,
+)
+from .separate import (
+    design_lengths,
+    design_spec,
+    evidence_spec,
+    several_spec,
+)
+from .stages import (
+    DIAGNOSED,
+    PARTS,
+    all_effects,
+    bound_spec,
+    dataset_spec,
+    diagnosis_spec,
+    evaluation_spec,
+    examples_spec,
+    identification_spec,
+    magnet_coefficient,
+    network_spec,
+    reconstruction_spec,
+    replay_spec,
+    retraining_spec,
+    search_spec,
+)
+
+__all__ = [
+    "DIAGNOSED",
+    "GROUPS",
+    "PARTS",
+    "SHARDS_OF_A_BLOCK",
+    "actuator_name",
+    "all_effects",
+    "batch_files",
+    "batches",
+    "bench_files",
+    "bench_name",
+    "bound_spec",
+    "calibration_spec",
+    "check_call",
+    "check_draws",
+    "command_files",
+    "compose",
+    "dataset_spec",
+    "design_lengths",
+    "design_spec",
+    "diagnosis_spec",
+    "evaluation_spec",
+    "evidence_spec",
+    "examples_spec",
+    "experiment_path",
+    "experiments",
+    "fleet_digest",
+    "identification_spec",
+    "magnet_coefficient",
+    "network_spec",
+    "plan",
+    "reconstruction_spec",
+    "recursively_sorted",
+    "reference_actuator",
+    "refuse_unread",
+    "replay_spec",
+    "retraining_spec",
+    "search_spec",
+    "several_spec",
+    "split_overrides",
+    "withheld_draws",
+    "withheld_jobs",
+    "withheld_shows_measured",
+    "withheld_spec",
+]
