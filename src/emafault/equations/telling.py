@@ -175,7 +175,7 @@ def picture(form: Described, found: Mapping[str, list[float]], actuator: Actuato
         along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
         axis = f"{along.replace('_', ' ')} ({function.COORDINATES[along]})"
     scaled = {n: [factor * v for v in found[n]] for n in ("before", "after")}
-    label = what.removeprefix("a ").removeprefix("the ") + ("" if units == "1" else f" ({units})")
+    label = what.removeprefix("a ").removeprefix("the ").rstrip(",") + ("" if units == "1" else f" ({units})")
     return {
         "x": found["x"], **scaled, "error": [abs(factor) * e for e in found["error"]],
         "x_label": axis, "y_label": label,
