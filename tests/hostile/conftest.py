@@ -14,7 +14,8 @@ import pytest
 from emafault import closed_form, config
 from emafault.cli import main
 from emafault.config import composition, draws, separate
-from emafault.identification.identifier import fit_identifier
+from emafault.identification.fitting import Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.posterior import Knowledge
 from emafault.identification.settings import NetworkSettings, TrainingSettings
 from emafault.paths import CONF
 from emafault.study.networks import seed_folder, write_json, write_yaml
@@ -82,8 +83,8 @@ def _train(folder: Path) -> None:
     features = np.concatenate(closed_form.forward(faults, actuator, 0.0, faults[:, 5]), axis=1)
     network = NetworkSettings.of({**composed["network"], "width": 3})
     training = TrainingSettings.of({**composed["training"], "epochs": 5})
-    magnet = {"alpha_m": spec["magnet_coefficient"], "lag": spec["known"]["lag"]}
-    fit = fit_identifier("network", features, faults, actuator, network=network, training=training, **magnet)
+    prior = Prior(actuator, spec["magnet_coefficient"], Knowledge(lag=spec["known"]["lag"]))
+    fit = fit_identifier(TrainingRows(features, faults), prior, Recipe(network, training))
     estimator = folder / "identifiers" / "weighted" / "network"
     fit.identifier.save(seed_folder(estimator, 0))
     write_json(estimator / "history.json", {"seeds": 1, "curves": []})

@@ -5,7 +5,7 @@ import pytest
 
 from emafault.errors import InputError
 from emafault.identification import evaluation
-from emafault.identification.identifier import fit_identifier
+from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
 
 
 def test_metrics_by_hand(width):
@@ -39,7 +39,8 @@ def test_over_seeds(make_set, actuator, width):
     known, new = make_set(120, 1), make_set(200, 2)
     results = []
     for seed in range(3):
-        fit = fit_identifier("network", known.features, known.faults, actuator, folds=2, seed=seed)
+        rows = TrainingRows(known.features, known.faults)
+        fit = fit_identifier(rows, Prior(actuator), Recipe(seed=seed), Calibration(folds=2))
         results.append(evaluation.evaluate(fit.identifier, new.rows(slice(10, 60)), width))
     summary = evaluation.over_seeds(results)
     errors = [result["errors"]["dT"]["mae"] for result in results]
@@ -51,7 +52,7 @@ def test_over_seeds(make_set, actuator, width):
 def test_runs_without_features_are_left_out_and_counted(make_set, actuator, width):
     known, new = make_set(60, 1), make_set(50, 2)
     known.features[4], new.features[[3, 7]] = np.nan, np.nan
-    fit = fit_identifier("closed_form", known.features, known.faults, actuator)
+    fit = fit_identifier(TrainingRows(known.features, known.faults), Prior(actuator))
     result = evaluation.evaluate(fit.identifier, new, width)
     assert (result["rows"], result["unidentified"]) == (48, 2)
     new.features[:] = np.nan

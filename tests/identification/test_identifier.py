@@ -1,6 +1,7 @@
 """The identifier: intervals with measured coverage, wider where magnets lag, files, a unit's calibration, ONNX."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,23 +10,28 @@ from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification import evaluation
 from emafault.identification.export import export_onnx
-from emafault.identification.identifier import Identifier, fit_identifier
+from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import ConformalIntervals, coverage
 from emafault.identification.posterior import Knowledge, nine_forward, nominal_nine
 from emafault.reconstruction.features import Features
 
 from .conftest import NOISE, RANGES
 
-SETTINGS = {"network": {"coordinates": "log", "width": 8}, "training": {"reweight": 1, "epochs": 60}}
+#: estimator -> what makes it
+RECIPES = {"network": Recipe({"coordinates": "log", "width": 8}, {"reweight": 1, "epochs": 60}), "closed_form": None}
+
+
+def rows_of(data, features=None, covariance=True):
+    """What is learnt from a set, with other features or without its covariance."""
+    return TrainingRows(
+        data.features if features is None else features, data.faults, data.covariance if covariance else None
+    )
 
 
 @pytest.fixture(scope="module")
 def fitted(training, actuator):
-    t = training
-    return {
-        name: fit_identifier(name, t.features, t.faults, actuator, covariance=t.covariance, seed=0, **SETTINGS)
-        for name in ("network", "closed_form")
-    }
+    return {name: fit_identifier(rows_of(training), Prior(actuator), recipe) for name, recipe in RECIPES.items()}
 
 
 @pytest.mark.parametrize("estimator", ["network", "closed_form"])
@@ -39,7 +45,8 @@ def test_coverage_is_the_level(fitted, fresh, estimator):
 
 
 def test_split_and_plain_intervals_cover_too(training, fresh, actuator):
-    fit = fit_identifier("network", training.features, training.faults, actuator, intervals="split", **SETTINGS)
+    rows = rows_of(training, covariance=False)
+    fit = fit_identifier(rows, Prior(actuator), RECIPES["network"], Calibration("split"))
     share = coverage(*fit.identifier.interval(fresh.features, 0.9), fresh.faults)
     assert abs(share["mean"] - 0.9) < 0.06  # 90 calibration rows
 
@@ -58,9 +65,7 @@ def test_lagging_magnets_widen_the_intervals(make_set, actuator, estimator):
     widths = {}
     for lag in (0.0, 40.0):
         known, new = make_set(600, 11, alpha_m=-4e-4, lag=lag), make_set(1000, 12, alpha_m=-4e-4, lag=lag)
-        fit = fit_identifier(
-            estimator, known.features, known.faults, actuator, alpha_m=-4e-4, covariance=known.covariance, **SETTINGS
-        )
+        fit = fit_identifier(rows_of(known), Prior(actuator, -4e-4), RECIPES[estimator])
         low, high = fit.identifier.interval(new.features, 0.9, new.covariance)
         assert abs(coverage(low, high, new.faults)["mean"] - 0.9) < 0.04
         widths[lag] = (high - low).mean(axis=0)
@@ -171,11 +176,8 @@ def test_intervals_hold_for_units_that_differ_with_and_without_a_healthy_record(
     noise = np.kron(NOISE, np.eye(3)) * np.outer(nominal[:6], nominal[:6])
     measured = nominal[:6] * own + np.random.default_rng(33).multivariate_normal(np.zeros(6), noise, 1000)
     errors = {}
-    for name in ("network", "closed_form"):
-        fit = fit_identifier(
-            name, taught.features, taught.faults, actuator, covariance=taught.covariance, units=units, known=known,
-            **SETTINGS,
-        )  # fmt: skip
+    for name, recipe in RECIPES.items():
+        fit = fit_identifier(replace(rows_of(taught), units=units), Prior(actuator, known=known), recipe)
         widths = []
         for unit in ((None, None), (measured, noise)):
             low, high = fit.identifier.interval(new.features, 0.9, new.covariance, *unit)
@@ -192,7 +194,7 @@ def test_a_reconstruction_without_covariance_tells_the_noise_of_a_healthy_record
     fresh, training, actuator
 ):
     healthy = nominal_nine(actuator)[:6]
-    fit = fit_identifier("network", training.features, training.faults, actuator, **SETTINGS)
+    fit = fit_identifier(rows_of(training, covariance=False), Prior(actuator), RECIPES["network"])
     np.testing.assert_allclose(np.diagonal(fit.identifier.noise), np.repeat(np.diagonal(NOISE), 3), rtol=0.25)
     unknown = np.full((1, 6, 6), np.nan)
     phases = np.full((1, 3), np.nan)
@@ -222,10 +224,8 @@ def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):
         covariance = np.diag(relative**2) * six[:, :, None] * six[:, None, :]
         xi = faults[:, 3:5] + 1e-3 * rng.normal(size=(runs, 2))
         sets.append(evaluation.FeatureSet(np.hstack([six, xi]), faults, covariance))
-    for name in ("closed_form", "network"):
-        fit = fit_identifier(
-            name, sets[0].features, sets[0].faults, actuator, covariance=sets[0].covariance, **SETTINGS
-        )
+    for recipe in RECIPES.values():
+        fit = fit_identifier(rows_of(sets[0]), Prior(actuator), recipe)
         result = evaluation.evaluate(fit.identifier, sets[1], width)
         assert result["errors"]["xi"]["mae"] < 1.1e-3
         assert result["errors"]["N"]["mae"] < 1e-3
@@ -247,8 +247,8 @@ def test_onnx_takes_si_and_equals_torch_and_the_network(fitted, fresh, tmp_path)
 
 def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fresh, training, actuator, width):
     bias = np.array([1.06, 1.06, 1.06, 0.9, 0.9, 0.9])
-    biased = training.features * bias
-    fit = fit_identifier("network", biased, training.faults, actuator, intervals="split", **SETTINGS)
+    biased = rows_of(training, training.features * bias, covariance=False)
+    fit = fit_identifier(biased, Prior(actuator), RECIPES["network"], Calibration("split"))
     unit = nominal_nine(actuator)[:6] * np.repeat([1.01, 0.995], 3)
     off = evaluation.FeatureSet(fresh.features * bias * np.repeat([1.01, 0.995], 3), fresh.faults)
     straight = evaluation.evaluate(fit.identifier, evaluation.FeatureSet(fresh.features * bias, fresh.faults), width)
@@ -258,7 +258,7 @@ def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fre
 
 def test_a_bias_that_a_healthy_record_takes_out_is_not_in_its_intervals(fresh, training, actuator, tmp_path):
     bias = np.array([1.3, 1.3, 1.3, 0.9, 0.9, 0.9])  # 75 K of dT
-    fit = fit_identifier("closed_form", training.features * bias, training.faults, actuator, **SETTINGS)
+    fit = fit_identifier(rows_of(training, training.features * bias, covariance=False), Prior(actuator))
     fit.identifier.save(tmp_path)
     identifier = Identifier.load(tmp_path)
     unit = nominal_nine(actuator)[:6] * np.repeat([1.01, 0.995], 3)
@@ -289,11 +289,10 @@ def test_a_network_of_nine_features_weighs_them_as_a_healthy_record_leaves_the_u
     measured = nominal * units * (1.0 + np.random.default_rng(3).multivariate_normal(np.zeros(9), relative, 1000))
     spread = relative * nominal[:, None] * nominal
     errors = {}
-    for name in ("network", "closed_form"):
-        fit = fit_identifier(
-            name, features, faults, actuator, covariance=covariance, units=nominal * own, known=known,
-            network={"coordinates": "log", "width": 8}, training={"reweight": 1, "epochs": 200},
-        )  # fmt: skip
+    recipe = Recipe({"coordinates": "log", "width": 8}, {"reweight": 1, "epochs": 200})
+    rows = TrainingRows(features, faults, covariance, nominal * own)
+    for name, by in {"network": recipe, "closed_form": None}.items():
+        fit = fit_identifier(rows, Prior(actuator, known=known), by)
         fit.identifier.save(tmp_path / name)
         loaded = Identifier.load(tmp_path / name)
         for unit in ((None, None), (measured, spread)):

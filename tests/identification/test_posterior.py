@@ -7,7 +7,8 @@ from emafault import closed_form
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification.evaluation import FeatureSet, evaluate
-from emafault.identification.identifier import Identifier, fit_identifier
+from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import coverage
 from emafault.identification.posterior import FREEDOM, Knowledge, model_error, nine_forward, nominal_nine, posterior
 from emafault.reconstruction.calibration import calibrate
@@ -76,11 +77,12 @@ def test_a_unit_within_its_specification(actuator):
     own = np.random.default_rng(4).normal(size=(RUNS, 3)) * [known.R, known.k, known.L]
     unit = np.repeat(1.0 + own, 3, axis=1)
     nine, covariance = measured(actuator, unit=unit)
-    taught = measured(actuator, seed=1)
-    model = fit_identifier("closed_form", taught[0], FAULTS, actuator, covariance=taught[1], known=known).identifier
+    nine_learnt, spread_learnt = measured(actuator, seed=1)
+    taught = TrainingRows(nine_learnt, FAULTS, spread_learnt)
+    model = fit_identifier(taught, Prior(actuator, known=known)).identifier
     low, high = model.interval(nine, 0.9, covariance)
     assert all(abs(share - 0.9) < 0.025 for share in coverage(low, high, FAULTS).values())
-    blind = fit_identifier("closed_form", taught[0], FAULTS, actuator, covariance=taught[1]).identifier
+    blind = fit_identifier(taught, Prior(actuator)).identifier
     assert coverage(*blind.interval(nine, 0.9, covariance), FAULTS)["dT"] < 0.5
     # one healthy recording of each of 200 units at an ambient temperature known to 0.5 K
     few = slice(0, 200)
@@ -107,10 +109,11 @@ def test_a_unit_within_its_specification(actuator):
 def test_a_network_on_nine_features_and_files(actuator, width, tmp_path):
     nine, covariance = measured(actuator, FAULTS[:600])
     fresh = FeatureSet(*(a[600:] for a in (measured(actuator)[0], FAULTS, measured(actuator)[1])))
-    settings = {"network": {"coordinates": "log", "width": 8}, "training": {"reweight": 1}, "intervals": "split"}
+    rows = TrainingRows(nine, FAULTS[:600], covariance)
+    recipe = Recipe({"coordinates": "log", "width": 8}, {"reweight": 1})
     errors = {}
-    for name in ("network", "closed_form"):
-        model = fit_identifier(name, nine, FAULTS[:600], actuator, covariance=covariance, **settings).identifier
+    for name, by in {"network": recipe, "closed_form": None}.items():
+        model = fit_identifier(rows, Prior(actuator), by, Calibration("split")).identifier
         assert model.parameters <= 200
         model.save(tmp_path / name)
         loaded = Identifier.load(tmp_path / name)

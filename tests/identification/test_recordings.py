@@ -8,7 +8,7 @@ import pytest
 from emafault import config
 from emafault.dataset import simulate_blocks, simulate_recording
 from emafault.faults import FAULT_NAMES
-from emafault.identification.identifier import fit_identifier
+from emafault.identification.fitting import Prior, TrainingRows, fit_identifier
 from emafault.identification.recordings import Model, identify_recordings
 from emafault.reconstruction import join_features, reconstruct
 
@@ -29,7 +29,7 @@ def models(actuator):
     for name, (method, settings) in METHODS.items():
         found = join_features([reconstruct(method, b.signals, b.interval, actuator, settings) for b in blocks])
         covariance = None if method == "paper" else found.covariance
-        fit = fit_identifier("closed_form", found.inputs, faults, actuator, covariance=covariance)
+        fit = fit_identifier(TrainingRows(found.inputs, faults, covariance), Prior(actuator))
         out[name] = Model(f"{name}/closed_form", method, settings, fit.identifier, 0.5)
     return out
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,11 +18,8 @@ from ..reconstruction.features import Features
 from .intervals import ConformalIntervals
 from .network import Network, logarithmic
 from .posterior import Knowledge, Posterior, model_error, nominal_nine, posterior
-from .settings import NetworkSettings, TrainingSettings
-from .training import TrainedNetwork, train
 
 ESTIMATORS = ("network", "closed_form")
-LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
 FILE = "identifier.json"
 _FORMAT = 1
 _KEYS = (
@@ -95,7 +91,7 @@ class Identifier:
         InputError : features of the wrong shape, or nine without covariance for the closed form
         """
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        return _estimate(self._beside(unit), features, covariance)
+        return self._beside(unit).at_nominal(features, covariance)
 
     def interval(
         self,
@@ -114,7 +110,7 @@ class Identifier:
         untold = covariance is None
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
         own = self._beside(unit)
-        value, variance = _estimate(own, features, covariance), _variance(own, features, covariance)
+        value, variance = own.at_nominal(features, covariance), own.variance_at_nominal(features, covariance)
         if untold and variance is not None:  # that of the unit alone
             variance = variance + own.intervals.typical_variance
         half = own.intervals.half_width(level, variance, len(features))
@@ -170,6 +166,42 @@ class Identifier:
             self.feature_high - self.feature_low + 1e-30
         )
         return np.maximum(beyond.max(axis=1), 0.0)
+
+    def at_nominal(self, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
+        """Faults (run, 6) of features that are scaled to the nominal unit, their covariance with them."""
+        if self.network is not None:
+            return self.network.predict(features)
+        if features.shape[1] == 9:
+            return self._posterior(features, covariance).faults
+        R, k = features[:, :3], features[:, 3:6]
+        if features.shape[1] == 8:
+            return closed_form.inverse_rotor_angle(
+                R, k, features[:, 6:], self.actuator, self.alpha_m, covariance, self.lag
+            )
+        return closed_form.inverse(R, k, self.actuator, self.alpha_m, self.lag)
+
+    def variance_at_nominal(self, features: np.ndarray, covariance: np.ndarray | None) -> np.ndarray | None:
+        """Variance (run, 6) that the noise of the features makes in ``at_nominal``; None where it is not known."""
+        if covariance is None or not np.any(np.isfinite(covariance)):
+            return None
+        if features.shape[1] == 9 and self.network is None:
+            return np.diagonal(self._posterior(features, covariance).covariance, axis1=1, axis2=2)
+        if features.shape[1] != 8:
+            derivative = closed_form.jacobian(self.at_nominal, features)
+        else:  # least squares takes real numbers only
+            columns = []
+            for j in range(6):
+                step = np.zeros(features.shape)
+                step[:, j] = 1e-5 * features[:, j]
+                change = self.at_nominal(features + step, covariance) - self.at_nominal(features - step, covariance)
+                columns.append(change / (2.0 * step[:, j : j + 1]))
+            derivative = np.stack(columns, axis=-1)
+        return np.einsum("npi,nij,npj->np", derivative, covariance, derivative)
+
+    def _posterior(self, features: np.ndarray, covariance: np.ndarray | None) -> Posterior:
+        if covariance is None:
+            raise InputError("covariance: none given, the closed form of nine features weighs them by it")
+        return posterior(features, covariance, self.actuator, self.alpha_m, self.known)
 
     def _beside(self, unit: np.ndarray | None) -> "Identifier":
         """What identifies features of a unit with healthy recordings, or of one without."""
@@ -305,210 +337,3 @@ def _from_plain(plain: Any) -> Identifier:
         None if of_units is None else ConformalIntervals.from_plain(of_units),
         network_of_units,
     )
-
-
-def over_laws(
-    features: np.ndarray, faults: np.ndarray, actuator: ActuatorParameters, alpha_m: float, lag: float
-) -> np.ndarray:
-    """(run, 6) R and k over those of the fault laws, of nine features (run, 9) with L.
-
-    Of the laws with and without xi in k the one that fits better counts.
-    """
-    used = logarithmic(features.shape[1])
-    ratios = []
-    for law in ("stator_fixed", "rotor_angle"):
-        R, k = closed_form.forward(faults, actuator, alpha_m, faults[:, 5] - lag, law)
-        true = np.concatenate([R, k, closed_form.inductance(faults, actuator)], axis=1)
-        ratios.append(features[:, :used] / true[:, :used])
-    return min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
-
-
-def learnt_healthy(
-    features: np.ndarray, faults: np.ndarray, actuator: ActuatorParameters, alpha_m: float, lag: float
-) -> np.ndarray:
-    """R, k and, of nine, L of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
-
-    A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
-    as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
-    differs from 1 by more than chance.
-    """
-    ratio = over_laws(features, faults, actuator, alpha_m, lag)
-    bias = np.mean(ratio, axis=0)
-    chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
-    return nominal_nine(actuator)[: ratio.shape[1]] * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
-
-
-def _estimate(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None = None) -> np.ndarray:
-    if identifier.network is not None:
-        return identifier.network.predict(features)
-    if features.shape[1] == 9:
-        return _posterior(identifier, features, covariance).faults
-    R, k, model = features[:, :3], features[:, 3:6], identifier
-    if features.shape[1] == 8:
-        return closed_form.inverse_rotor_angle(
-            R, k, features[:, 6:], model.actuator, model.alpha_m, covariance, model.lag
-        )
-    return closed_form.inverse(R, k, model.actuator, model.alpha_m, model.lag)
-
-
-def _posterior(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> Posterior:
-    if covariance is None:
-        raise InputError("covariance: none given, the closed form of nine features weighs them by it")
-    return posterior(features, covariance, identifier.actuator, identifier.alpha_m, identifier.known)
-
-
-def _variance(identifier: Identifier, features: np.ndarray, covariance: np.ndarray | None) -> np.ndarray | None:
-    """Variance (run, 6) that the noise of the features makes in the estimates; None where it is not known."""
-    if covariance is None or not np.any(np.isfinite(covariance)):
-        return None
-    if features.shape[1] == 9 and identifier.network is None:
-        found = _posterior(identifier, features, covariance)
-        return np.diagonal(found.covariance, axis1=1, axis2=2)
-    if features.shape[1] != 8:
-        derivative = closed_form.jacobian(lambda x: _estimate(identifier, x), features)
-    else:  # least squares takes real numbers only
-        columns = []
-        for j in range(6):
-            step = np.zeros(features.shape)
-            step[:, j] = 1e-5 * features[:, j]
-            change = _estimate(identifier, features + step, covariance) - _estimate(
-                identifier, features - step, covariance
-            )
-            columns.append(change / (2.0 * step[:, j : j + 1]))
-        derivative = np.stack(columns, axis=-1)
-    return np.einsum("npi,nij,npj->np", derivative, covariance, derivative)
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A fitted identifier and, for a network, how its training went."""
-
-    identifier: Identifier
-    trained: TrainedNetwork | None = None
-
-
-def fit_identifier(
-    estimator: str,
-    features: np.ndarray,
-    faults: np.ndarray,
-    actuator: ActuatorParameters,
-    *,
-    alpha_m: float = 0.0,
-    lag: float = 0.0,
-    known: Knowledge | None = None,
-    covariance: np.ndarray | None = None,
-    units: np.ndarray | None = None,
-    network: Mapping[str, Any] | NetworkSettings | None = None,
-    training: Mapping[str, Any] | TrainingSettings | None = None,
-    intervals: str = "cross",
-    folds: int = 5,
-    seed: int = 0,
-) -> Fit:
-    """Train an estimator and calibrate its intervals on rows that it, or the network of their fold, was not trained on.
-
-    Rows whose record gave no features (NaN) are left out. Intervals are calibrated on rows scaled to the nominal unit:
-    what a unit is off by is not the estimator's error, and whoever identifies tells how well it is known. A biased
-    reconstruction has its bias in a unit's healthy recordings, too: the closed form, which does not learn it, has other
-    intervals with them than without. A network of nine features that learns from units that differ has a second one for
-    units with a healthy recording, for how nine features are best weighed depends on what of the unit is known.
-
-    Parameters
-    ----------
-    estimator : ``network`` or ``closed_form``
-    features : (run, 6), (run, 8) or (run, 9); faults : (run, 6)
-    alpha_m, lag : the magnets' temperature coefficient (1/K) and how much colder than the winding they are expected
-        (K); the
-        closed form needs them, a network learns them
-    known : what is known beforehand of a unit without healthy recordings; of it the closed form of nine features
-        makes its posterior, whose intervals it has, and its lag counts there
-    covariance : (run, 6, 6) of R and k, to normalise the intervals, or (run, 9, 9) of nine features; None where the
-        reconstruction gives none
-    units : (run, 9) R0 (ohm), k0 (V s/rad) and L0 (H) of each run's unit; None where all are nominal
-    intervals : ``cross`` (``folds`` further networks, all rows calibrate) or ``split`` (the test part of the
-        70/15/15 calibrates)
-
-    Raises
-    ------
-    InputError : an unknown estimator or kind of intervals
-    """
-    if estimator not in ESTIMATORS:
-        raise InputError(f"estimator: got '{estimator}', accepted are {', '.join(ESTIMATORS)}")
-    if intervals not in ("cross", "split"):
-        raise InputError(f"intervals: got '{intervals}', accepted are cross and split")
-    features, faults = np.asarray(features, float), np.asarray(faults, float)
-    identified = np.all(np.isfinite(features), axis=1)
-    if not np.all(identified):
-        features, faults = features[identified], faults[identified]
-        covariance = None if covariance is None else covariance[identified]
-        units = None if units is None else units[identified]
-    if len(features) < 10:
-        raise InputError(f"identification: {len(features)} runs have features, at least 10 are needed to learn from")
-    if covariance is not None and not np.all(np.isfinite(covariance)):
-        covariance = None
-    placeholder = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
-    identifier = Identifier(actuator, alpha_m, lag, placeholder, None, features.min(axis=0), features.max(axis=0))
-    identifier = replace(identifier, known=known or Knowledge(lag=lag))
-    nominal, spread = features.copy(), covariance
-    scaled = logarithmic(features.shape[1])
-    if units is not None:
-        scale = nominal_nine(actuator)[:scaled] / units[:, :scaled]
-        nominal[:, :scaled] *= scale
-        spread = None if covariance is None else covariance * scale[:, :, None] * scale[:, None, :]
-    # nine features leave more than a fault, by which a network learns to weigh them where units differ; six do not
-    learnt = features if scaled == 9 else nominal
-    if covariance is None and scaled == 6:
-        ratio = over_laws(nominal, faults, actuator, alpha_m, lag)
-        noise = np.cov(ratio / np.mean(ratio, axis=0), rowvar=False) + LEAST_NOISE * np.eye(6)
-        identifier = replace(identifier, noise=noise)
-    trained = None
-    if estimator == "network":
-        trained = train(learnt, faults, network, training, seed)
-        healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
-        identifier = replace(identifier, network=trained.network, healthy=healthy)
-
-    def scored(
-        model: TrainedNetwork, learnt: np.ndarray, shown: np.ndarray, spread: np.ndarray | None, seed: int
-    ) -> ConformalIntervals:
-        """Intervals of a network by rows as ``shown``, of networks that learnt without them."""
-
-        def part(of: TrainedNetwork, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-            own, noise = replace(identifier, network=of.network), None if spread is None else spread[rows]
-            return _estimate(own, shown[rows], noise) - faults[rows], _variance(own, shown[rows], noise)
-
-        if intervals == "split":
-            residuals, variance = part(model, model.test_rows)
-            return ConformalIntervals.calibrate(residuals, variance, "split, test rows")
-        order = np.random.default_rng([seed, 20]).permutation(len(shown))
-        parts = []
-        for fold, left_out in enumerate(np.array_split(order, folds)):
-            rest = np.setdiff1d(order, left_out)
-            parts.append(part(train(learnt[rest], faults[rest], network, training, seed + 1000 * (fold + 1)), left_out))
-        residuals = np.concatenate([p[0] for p in parts])
-        variance = None if spread is None else np.concatenate([v for _, v in parts if v is not None])
-        found = ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {folds} folds")
-        return found.of_a_worse(part(model, model.test_rows)[0], residuals) if len(model.test_rows) else found
-
-    if trained is None and features.shape[1] == 9:
-        return Fit(replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features")))
-    if trained is None:
-        residuals, variance = _estimate(identifier, nominal, spread) - faults, _variance(identifier, nominal, spread)
-        found = ConformalIntervals.calibrate(residuals, variance, "closed form, all rows")
-        if covariance is None and scaled == 6:
-            unbiased = nominal.copy()
-            healthy = learnt_healthy(nominal, faults, actuator, alpha_m, lag)
-            unbiased[:, :scaled] *= nominal_nine(actuator)[:scaled] / healthy
-            left = _estimate(identifier, unbiased) - faults
-            of_units = ConformalIntervals.calibrate(left, None, "closed form, all rows less their bias")
-            identifier = replace(identifier, intervals_of_units=of_units)
-        return Fit(replace(identifier, intervals=found))
-    found = scored(trained, learnt, nominal, spread, seed)
-    if scaled == 9 and units is not None and spread is not None:
-        # as a healthy recording with the noise of the row's own leaves the unit known
-        draws = np.random.default_rng([seed, 40]).normal(size=nominal.shape)
-        size = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
-        alike = spread / (size[:, :, None] * size[:, None, :]) + LEAST_NOISE * np.eye(9)
-        beside = nominal + size * (np.linalg.cholesky(alike) @ draws[:, :, None])[:, :, 0]
-        other = train(beside, faults, network, training, seed)
-        of_units = scored(other, beside, beside, 2.0 * spread, seed)
-        identifier = replace(identifier, intervals_of_units=of_units, network_of_units=other.network)
-    return Fit(replace(identifier, intervals=found), trained)

@@ -12,13 +12,13 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import unit_parameters
 from ..errors import InputError
 from ..identification.evaluation import fault_range
-from ..identification.identifier import Fit, fit_identifier
+from ..identification.fitting import Prior, Recipe, TrainingRows, fit_identifier
 from ..identification.posterior import Knowledge
 from ..identification.search import SearchSettings, Trial, choose, finished, ranked, run_worker
 from ..io.atomic import whole_folder, write_text
 from ..plain import read_json
 from ..progress import progress, say
-from .features import FeatureTable, read_features
+from .features import read_features
 
 HISTORY = "history.json"
 
@@ -48,23 +48,6 @@ def seed_folder(folder: str | Path, seed: int) -> Path:
     return Path(folder) / f"seed_{seed}"
 
 
-def _fit(estimator: str, table: FeatureTable, units: np.ndarray | None, spec: Mapping[str, Any], seed: int) -> Fit:
-    return fit_identifier(
-        estimator,
-        table.inputs,
-        table.faults,
-        ActuatorParameters(**spec["actuator"]),
-        alpha_m=spec["magnet_coefficient"],
-        lag=spec["known"]["lag"],
-        known=Knowledge(**spec["known"]),
-        covariance=table.covariance,
-        units=units,
-        network=spec.get("network"),
-        training=spec.get("training"),
-        seed=seed,
-    )
-
-
 def train_identifier(
     estimator: str, features: str, spec: Mapping[str, Any], history: str | Path, chosen: str | None = None
 ) -> None:
@@ -85,12 +68,15 @@ def train_identifier(
     units = unit_parameters(spec["units"])[whole.known] if "units" in spec else None
     if chosen:
         settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
+    rows = TrainingRows(table.inputs, table.faults, table.covariance, units)
+    prior = Prior(ActuatorParameters(**spec["actuator"]), spec["magnet_coefficient"], Knowledge(**spec["known"]))
     folder, curves = Path(history).parent, []
-    seeds = range(1 if estimator == "closed_form" else settings["seeds"])
+    learns = estimator != "closed_form"
+    seeds = range(settings["seeds"] if learns else 1)
     with whole_folder(folder) as part:
         for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
-            kind = "closed_form" if estimator == "closed_form" else "network"
-            fit = _fit(kind, table, units, settings, seed)
+            recipe = Recipe(settings["network"], settings["training"], seed) if learns else None
+            fit = fit_identifier(rows, prior, recipe)
             fit.identifier.save(seed_folder(part, seed))
             if fit.trained:
                 curves.append([asdict(curve) for curve in fit.trained.curves])

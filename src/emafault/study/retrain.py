@@ -16,7 +16,7 @@ from ..dataset import as_batch, sample_runs, simulate_and_measure
 from ..equations.carried import entries
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..identification.identifier import fit_identifier
+from ..identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_network
 from ..io.bench import read_bench
 from ..io.recording import Recording
 from ..plain import read_json
@@ -82,12 +82,10 @@ def retrain_network(
     for kind, effects in verdict["simulator"].items():
         simulated = {"effects": effects, "unlisted": entries(verdict) if kind == "after" else []}
         features, faults = simulated_features(recordings, simulated, spec, method, settings, f"simulate {kind}")
-        estimates = []
+        rows, estimates = TrainingRows(features.six, faults).identified(), []
         for seed in progress(range(spec["seeds"]), f"train {kind}", spec["seeds"]):
-            fit = fit_identifier(
-                "network", features.six, faults, actuator,
-                network=spec["network"], training=spec["training"], intervals="split", seed=seed,
-            )  # fmt: skip
+            recipe = Recipe(spec["network"], spec["training"], seed)
+            fit = fit_network(rows, Prior(actuator), recipe, Calibration("split"))
             estimates.append([fit.identifier.predict(f.six)[0] for f in measured.values()])
         found = np.mean(estimates, axis=0)
         off = 100.0 * (found - np.array([truths[n] for n in measured])) / width

@@ -1,0 +1,267 @@
+"""Identifiers from simulated runs: what is learnt, by whom, and on which rows the intervals are calibrated.
+
+A closed form learns nothing; a network learns from rows, is the work of a ``Recipe``, and has its intervals from a
+``Calibration`` on rows that it, or the network of their fold, was not trained on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .. import closed_form
+from ..actuator.parameters import ActuatorParameters
+from ..errors import InputError
+from .identifier import Identifier
+from .intervals import ConformalIntervals
+from .network import logarithmic
+from .posterior import Knowledge, nominal_nine
+from .settings import NetworkSettings, TrainingSettings
+from .training import TrainedNetwork, train
+
+LEAST_ROWS = 10  # that an identifier is made from
+LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
+KINDS = ("cross", "split")
+
+
+@dataclass(frozen=True)
+class TrainingRows:
+    """Features of simulated runs in SI units, with their truth."""
+
+    features: np.ndarray  # (run, 6), (run, 8) or (run, 9), NaN where a record gave none
+    faults: np.ndarray  # (run, 6)
+    covariance: np.ndarray | None = None  # (run, 6, 6) of R and k, or (run, 9, 9); None where none is told
+    units: np.ndarray | None = None  # (run, 9) R0 (ohm), k0 (V s/rad) and L0 (H) of each run's; None: all are nominal
+
+    @property
+    def scaled(self) -> int:
+        """How many features a unit has a value of its own of."""
+        return logarithmic(self.features.shape[1])
+
+    def rows(self, index: Any) -> "TrainingRows":
+        """The same with some of the rows."""
+        covariance, units = (None if a is None else a[index] for a in (self.covariance, self.units))
+        return TrainingRows(self.features[index], self.faults[index], covariance, units)
+
+    def identified(self) -> "TrainingRows":
+        """The rows that have features, with a covariance if all of them tell one.
+
+        Raises
+        ------
+        InputError : fewer than ``LEAST_ROWS`` have
+        """
+        known = np.all(np.isfinite(self.features), axis=1)
+        rows = self if np.all(known) else self.rows(known)
+        count = len(rows.features)
+        if count < LEAST_ROWS:
+            raise InputError(
+                f"identification: {count} runs have features, at least {LEAST_ROWS} are needed to learn from"
+            )
+        told = rows.covariance is not None and np.all(np.isfinite(rows.covariance))
+        return rows if told else replace(rows, covariance=None)
+
+    def of_nominal(self, actuator: ActuatorParameters) -> "TrainingRows":
+        """As the nominal unit would have given them: features and covariance are scaled by what each unit is off."""
+        features, covariance = self.features.copy(), self.covariance
+        if self.units is not None:
+            scale = nominal_nine(actuator)[: self.scaled] / self.units[:, : self.scaled]
+            features[:, : self.scaled] *= scale
+            covariance = None if covariance is None else covariance * scale[:, :, None] * scale[:, None, :]
+        return TrainingRows(features, self.faults, covariance)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is taken for known before anything is learnt."""
+
+    actuator: ActuatorParameters
+    alpha_m: float = 0.0  # 1/K, of the magnets; the closed form needs it, a network learns it
+    #: of a unit without healthy recordings and of the magnets' lag; of it the closed form of nine features makes its
+    #: posterior, whose intervals it has
+    known: Knowledge = field(default_factory=Knowledge)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a network is trained; the same seed gives the same weights."""
+
+    network: Mapping[str, Any] | NetworkSettings | None = None
+    training: Mapping[str, Any] | TrainingSettings | None = None
+    seed: int = 0
+
+    def train(self, lesson: "Lesson", rows: Any = slice(None), fold: int = 0) -> TrainedNetwork:
+        """A network that learnt some rows; each fold starts from a seed of its own."""
+        start = self.seed + 1000 * fold
+        return train(lesson.learnt[rows], lesson.shown.faults[rows], self.network, self.training, start)
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What a network learns from, and the same rows as it is shown them later, on which it is judged."""
+
+    learnt: np.ndarray  # (run, feature)
+    shown: TrainingRows
+
+    def judged(
+        self, identifier: Identifier, trained: TrainedNetwork, rows: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Errors (row, 6) of a network on some rows, and the variance of them that the features' noise makes."""
+        of, own = self.shown.rows(rows), replace(identifier, network=trained.network)
+        error = own.at_nominal(of.features, of.covariance) - of.faults
+        return error, own.variance_at_nominal(of.features, of.covariance)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Which rows calibrate a network's intervals.
+
+    ``cross``: all of them, by ``folds`` further networks, each judged on the rows that it has not learnt; ``split``:
+    the test rows of the network itself.
+    """
+
+    kind: str = "cross"
+    folds: int = 5
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(f"intervals: got '{self.kind}', accepted are {' and '.join(KINDS)}")
+
+    def intervals(
+        self, identifier: Identifier, trained: TrainedNetwork, lesson: Lesson, recipe: Recipe
+    ) -> ConformalIntervals:
+        """Intervals of a network that learnt a lesson."""
+        if self.kind == "split":
+            own = lesson.judged(identifier, trained, trained.test_rows)
+            return ConformalIntervals.calibrate(*own, "split, test rows")
+        every = np.arange(len(lesson.learnt))
+        order = np.random.default_rng([recipe.seed, 20]).permutation(every)
+        parts = []
+        for fold, left_out in enumerate(np.array_split(order, self.folds), start=1):
+            of_fold = recipe.train(lesson, np.setdiff1d(every, left_out), fold)
+            parts.append(lesson.judged(identifier, of_fold, left_out))
+        residuals = np.concatenate([error for error, _ in parts])
+        told = [variance for _, variance in parts if variance is not None]
+        variance = np.concatenate(told) if told else None
+        found = ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {self.folds} folds")
+        if not len(trained.test_rows):
+            return found
+        return found.of_a_worse(lesson.judged(identifier, trained, trained.test_rows)[0], residuals)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted identifier and, for a network, how its training went."""
+
+    identifier: Identifier
+    trained: TrainedNetwork | None = None
+
+
+def fit_identifier(
+    rows: TrainingRows, prior: Prior, recipe: Recipe | None = None, calibration: Calibration | None = None
+) -> Fit:
+    """The network of a recipe, or without one the closed form, with intervals.
+
+    Rows without features are left out. Intervals are calibrated on rows scaled to the nominal unit: what a unit is off
+    by is not the estimator's error, and whoever identifies tells how well it is known.
+
+    Raises
+    ------
+    InputError : too few rows with features, or impossible settings
+    """
+    rows = rows.identified()
+    if recipe is None:
+        return Fit(fit_closed_form(rows, prior))
+    return fit_network(rows, prior, recipe, calibration or Calibration())
+
+
+def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
+    """The closed form; of nine features its intervals are the posterior's, of others they are calibrated on all rows.
+
+    A biased reconstruction has its bias in a unit's healthy recordings, too: the closed form, which does not learn it,
+    has other intervals with them than without.
+    """
+    nominal = rows.of_nominal(prior.actuator)
+    identifier = _untold(rows, nominal, prior)
+    if rows.features.shape[1] == 9:
+        return replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features"))
+    error = identifier.at_nominal(nominal.features, nominal.covariance) - nominal.faults
+    variance = identifier.variance_at_nominal(nominal.features, nominal.covariance)
+    found = ConformalIntervals.calibrate(error, variance, "closed form, all rows")
+    if rows.covariance is not None:
+        return replace(identifier, intervals=found)
+    unbiased = nominal.features.copy()
+    unbiased[:, : rows.scaled] *= nominal_nine(prior.actuator)[: rows.scaled] / learnt_healthy(nominal, prior)
+    left = identifier.at_nominal(unbiased) - nominal.faults
+    of_units = ConformalIntervals.calibrate(left, None, "closed form, all rows less their bias")
+    return replace(identifier, intervals=found, intervals_of_units=of_units)
+
+
+def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, calibration: Calibration) -> Fit:
+    """A network; of nine features that learns from units that differ, a second one for units with a healthy recording.
+
+    For how nine features are best weighed depends on what of the unit is known. Nine features leave more than a fault,
+    by which a network learns to weigh them where units differ; six do not, and are learnt as of the nominal unit.
+    """
+    nominal = rows.of_nominal(prior.actuator)
+    lesson = Lesson(rows.features if rows.scaled == 9 else nominal.features, nominal)
+    trained = recipe.train(lesson)
+    identifier = replace(_untold(rows, nominal, prior), network=trained.network, healthy=learnt_healthy(nominal, prior))
+    identifier = replace(identifier, intervals=calibration.intervals(identifier, trained, lesson, recipe))
+    if rows.scaled == 9 and rows.units is not None and nominal.covariance is not None:
+        shown = beside_a_healthy_recording(nominal, recipe.seed)
+        lesson = Lesson(shown.features, shown)
+        other = recipe.train(lesson)
+        of_units = calibration.intervals(identifier, other, lesson, recipe)
+        identifier = replace(identifier, intervals_of_units=of_units, network_of_units=other.network)
+    return Fit(identifier, trained)
+
+
+def beside_a_healthy_recording(nominal: TrainingRows, seed: int) -> TrainingRows:
+    """Rows as a healthy recording with the noise of each row's own leaves the unit known."""
+    spread = nominal.covariance
+    assert spread is not None
+    draws = np.random.default_rng([seed, 40]).normal(size=nominal.features.shape)
+    size = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
+    alike = spread / (size[:, :, None] * size[:, None, :]) + LEAST_NOISE * np.eye(9)
+    features = nominal.features + size * (np.linalg.cholesky(alike) @ draws[:, :, None])[:, :, 0]
+    return TrainingRows(features, nominal.faults, 2.0 * spread)
+
+
+def _untold(rows: TrainingRows, nominal: TrainingRows, prior: Prior) -> Identifier:
+    """The closed form with all but its intervals; where no covariance is told, with that of the rows."""
+    none = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
+    noise = None
+    if rows.covariance is None and rows.scaled == 6:
+        ratio = over_laws(nominal, prior)
+        noise = np.cov(ratio / np.mean(ratio, axis=0), rowvar=False) + LEAST_NOISE * np.eye(6)
+    low, high = rows.features.min(axis=0), rows.features.max(axis=0)
+    return Identifier(
+        prior.actuator, prior.alpha_m, prior.known.lag, none, None, low, high, known=prior.known, noise=noise
+    )
+
+
+def over_laws(rows: TrainingRows, prior: Prior) -> np.ndarray:
+    """(run, 6) R and k of rows of the nominal unit over those of the fault laws, of nine features (run, 9) with L.
+
+    Of the laws with and without xi in k the one that fits better counts.
+    """
+    ratios = []
+    for law in ("stator_fixed", "rotor_angle"):
+        R, k = closed_form.forward(rows.faults, prior.actuator, prior.alpha_m, rows.faults[:, 5] - prior.known.lag, law)
+        true = np.concatenate([R, k, closed_form.inductance(rows.faults, prior.actuator)], axis=1)
+        ratios.append(rows.features[:, : rows.scaled] / true[:, : rows.scaled])
+    return min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
+
+
+def learnt_healthy(rows: TrainingRows, prior: Prior) -> np.ndarray:
+    """R, k and, of nine, L of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
+
+    A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
+    as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
+    differs from 1 by more than chance.
+    """
+    ratio = over_laws(rows, prior)
+    bias = np.mean(ratio, axis=0)
+    chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
+    return nominal_nine(prior.actuator)[: rows.scaled] * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
