@@ -99,7 +99,7 @@ def test_the_study_leaves_its_results_and_its_report(house):
     assert found["weighted_floating", "closed_form"]["errors.dT.mae"]["mean"] < 0.5
     assert found["paper", "network"]["errors.dT.mae"]["mean"] > 1.0
     check = json.loads((experiment / "export" / "check.json").read_text())
-    assert check["against_torch"] < 1e-4
+    assert check["against_torch"] < 1e-4 and check["calibrated"]["against_torch"] < 1e-4
     assert "duration: 1.0" in (experiment / "configuration.yaml").read_text()
 
 
@@ -118,6 +118,7 @@ def test_the_evaluation_is_tracked_with_its_trials_below(house):
     assert runs[tracked["run_id"]] == "smoke" and children == 6
     assert metrics["error_dT_K"] < 0.5 < 1.0 < metrics["paper_dT_K"] and len(metrics) <= 20
     artifacts = house / "results" / "mlflow_artifacts" / tracked["run_id"] / "artifacts"
+    assert (artifacts / "model" / "network_calibrated.onnx").is_file()
     assert (artifacts / "model" / "network.onnx").is_file() and (artifacts / "figures" / "figure_2.png").is_file()
     table = json.loads((artifacts / "tables" / "metrics.json").read_text())
     assert ["weighted_floating", "closed_form", "all", "errors.dT.mae"] in [row[:4] for row in table["data"]]
@@ -165,6 +166,22 @@ def test_an_override_reruns_only_what_reads_it(house, override, must, must_not):
 def test_another_experiment_stands_beside_and_shares_what_is_equal(house):
     planned = _planned(house, "--config", "experiment=smoke", "overrides=name=mine dataset=smoke training.epochs=50")
     assert "simulate_shard" not in planned and planned["train_identifier"] == 7
+
+
+@pytest.mark.parametrize(
+    ("experiment", "folder", "exported"),
+    [
+        (["experiment=nine_features"], "nine_features", "nine/searched"),
+        (["experiment=nine_features", "overrides=search=none"], "nine_features", "nine/network"),
+        (["experiment=filters"], "filters/average_of_2", "nine/network"),
+        (["experiment=paper", "overrides=search=none reconstruction=[paper,weighted]"], "paper", "weighted/network"),
+    ],
+)
+def test_the_network_of_the_features_that_an_experiment_is_about_is_exported(house, experiment, folder, exported):
+    target = f"results/experiments/{folder}/export/check.json"
+    run = _snakemake(house, "--dry-run", "--config", *experiment, "--", target)
+    rule = (run.stdout + run.stderr).split("rule export_network:")[1].split("output:")[0]
+    assert run.returncode == 0 and f"results/experiments/{folder}/identifiers/{exported}" in rule
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from emafault.errors import InputError
 from emafault.identification import evaluation
-from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
 
 
 def test_metrics_by_hand(width):
@@ -40,7 +40,7 @@ def test_over_seeds(make_set, actuator, width):
     results = []
     for seed in range(3):
         rows = TrainingRows(known.features, known.faults)
-        fit = fit_identifier(rows, Prior(actuator), Recipe(seed=seed), Calibration(folds=2))
+        fit = fit_identifier(rows, Prior(actuator), Recipe(seed=seed), HeldOut(folds=2))
         results.append(evaluation.evaluate(fit.identifier, new.rows(slice(10, 60)), width))
     summary = evaluation.over_seeds(results)
     errors = [result["errors"]["dT"]["mae"] for result in results]

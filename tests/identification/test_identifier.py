@@ -10,7 +10,7 @@ from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification import evaluation
 from emafault.identification.export import export_onnx
-from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
 from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import ConformalIntervals, coverage
 from emafault.identification.posterior import Knowledge, nine_forward, nominal_nine
@@ -46,7 +46,7 @@ def test_coverage_is_the_level(fitted, fresh, estimator):
 
 def test_split_and_plain_intervals_cover_too(training, fresh, actuator):
     rows = rows_of(training, covariance=False)
-    fit = fit_identifier(rows, Prior(actuator), RECIPES["network"], Calibration("split"))
+    fit = fit_identifier(rows, Prior(actuator), RECIPES["network"], HeldOut("split"))
     share = coverage(*fit.identifier.interval(fresh.features, 0.9), fresh.faults)
     assert abs(share["mean"] - 0.9) < 0.06  # 90 calibration rows
 
@@ -234,8 +234,9 @@ def test_eight_features_of_an_angle_resolved_reconstruction(actuator, width):
 
 def test_onnx_takes_si_and_equals_torch_and_the_network(fitted, fresh, tmp_path):
     path = tmp_path / "network.onnx"
-    network = fitted["network"].identifier.network
-    difference = export_onnx(network, path, fresh.features[:50])
+    identifier = fitted["network"].identifier
+    network = identifier.network
+    difference = export_onnx(identifier, path, fresh.features[:50])
     assert difference["against_torch"] < 1e-5
     assert difference["against_float64"] < 1e-4
     import onnxruntime
@@ -248,7 +249,7 @@ def test_onnx_takes_si_and_equals_torch_and_the_network(fitted, fresh, tmp_path)
 def test_a_biased_reconstruction_is_calibrated_against_its_own_healthy_point(fresh, training, actuator, width):
     bias = np.array([1.06, 1.06, 1.06, 0.9, 0.9, 0.9])
     biased = rows_of(training, training.features * bias, covariance=False)
-    fit = fit_identifier(biased, Prior(actuator), RECIPES["network"], Calibration("split"))
+    fit = fit_identifier(biased, Prior(actuator), RECIPES["network"], HeldOut("split"))
     unit = nominal_nine(actuator)[:6] * np.repeat([1.01, 0.995], 3)
     off = evaluation.FeatureSet(fresh.features * bias * np.repeat([1.01, 0.995], 3), fresh.faults)
     straight = evaluation.evaluate(fit.identifier, evaluation.FeatureSet(fresh.features * bias, fresh.faults), width)

@@ -7,7 +7,7 @@ from emafault import closed_form
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification.evaluation import FeatureSet, evaluate
-from emafault.identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
 from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import coverage
 from emafault.identification.posterior import FREEDOM, Knowledge, model_error, nine_forward, nominal_nine, posterior
@@ -113,7 +113,7 @@ def test_a_network_on_nine_features_and_files(actuator, width, tmp_path):
     recipe = Recipe({"coordinates": "log", "width": 8}, {"reweight": 1})
     errors = {}
     for name, by in {"network": recipe, "closed_form": None}.items():
-        model = fit_identifier(rows, Prior(actuator), by, Calibration("split")).identifier
+        model = fit_identifier(rows, Prior(actuator), by, HeldOut("split")).identifier
         assert model.parameters <= 200
         model.save(tmp_path / name)
         loaded = Identifier.load(tmp_path / name)

@@ -193,9 +193,11 @@ def estimators(wildcards):
 
 
 def exported_network(wildcards):
-    """The network worth embedding: the searched one, else that of the last method."""
+    """The network worth embedding: the searched one, else that of the features searched on, else of the last method."""
     networks = [path for path in estimators(wildcards) if "closed_form" not in path]
-    return ([path for path in networks if "identifiers/paper" not in path] or networks)[-1:]
+    own = os.path.join("identifiers", composed(wildcards)["search"]["reconstruction"], "")
+    others = [path for path in networks if "identifiers/paper" not in path]
+    return ([path for path in networks if own in path] or others or networks)[-1:]
 
 
 def exported_features(wildcards):

@@ -67,6 +67,7 @@ rule export_network:
         network=exported_network,
     output:
         model=f"{CASE}/export/network.onnx",
+        calibrated=f"{CASE}/export/network_calibrated.onnx",
         source=f"{CASE}/export/network.c",
         check=f"{CASE}/export/check.json",
     log:

@@ -115,6 +115,7 @@ rule track_evaluation:
         estimators=estimators,
         search=search_results,
         model=rules.export_network.output.model,
+        calibrated=rules.export_network.output.calibrated,
         source=rules.export_network.output.source,
         exported=exported_network,
         report=rules.draw_report.output.report,

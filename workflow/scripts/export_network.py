@@ -8,4 +8,4 @@ from emafault.study.networks import export_network
 with one_line_errors(snakemake.log[0]):
     folder = Path(snakemake.input.network[0])
     out = snakemake.output
-    export_network(folder, snakemake.input.features, out.model, out.source, out.check)
+    export_network(folder, snakemake.input.features, out.model, out.calibrated, out.source, out.check)

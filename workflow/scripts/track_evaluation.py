@@ -8,6 +8,7 @@ with one_line_errors(snakemake.log[0]):
     given = snakemake.input
     files = {
         given.model: "model",
+        given.calibrated: "model",
         given.source: "model",
         given.report: "",
         given.figures: "figures",

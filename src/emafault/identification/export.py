@@ -1,6 +1,11 @@
-"""ONNX export of a network with its scaling inside: R (ohm), k (V s/rad), of nine L (H) in, faults in SI units out."""
+"""ONNX export of an identifier's networks, scaling inside: R (ohm), k (V s/rad), of nine L (H) in, faults in SI out.
+
+A unit without healthy recordings and one with them are identified by two files, since their networks may differ and the
+second takes the unit's own R, k and L too.
+"""
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +13,21 @@ import numpy as np
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically
+from .identifier import Identifier
 from .network import Network, logarithmic
 from .training import torch_layers
+
+
+def network_of(identifier: Identifier) -> Network:
+    """The network of an identifier.
+
+    Raises
+    ------
+    InputError : a closed form, which has none
+    """
+    if identifier.network is None:
+        raise InputError("export: got a closed form, accepted is an identifier with a network")
+    return identifier.network
 
 
 def torch_module(network: Network):
@@ -35,8 +53,29 @@ def torch_module(network: Network):
     return Identification().to(torch.float32).eval()
 
 
-def export_onnx(network: Network, path: str | Path, check_on: np.ndarray) -> dict[str, float]:
-    """Write the ONNX file and compare it with torch and with the float64 network on given features.
+def calibrated_module(identifier: Identifier):
+    """What identifies a unit with healthy recordings as a torch module in float32, the scaling to it included."""
+    import torch
+
+    network = network_of(identifier.calibrated)
+    nominal = identifier.nominal_unit(len(network.scaler.feature_mean))
+
+    class Calibrated(torch.nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.network = torch_module(network)
+            self.register_buffer("nominal", torch.from_numpy(nominal.copy()))
+
+        def forward(self, features, unit):
+            own = len(nominal)
+            x = features[:, :own] * (self.nominal / unit)
+            return self.network(torch.cat([x, features[:, own:]], dim=1) if features.shape[1] > own else x)
+
+    return Calibrated().to(torch.float32).eval()
+
+
+def export_onnx(identifier: Identifier, path: str | Path, check_on: np.ndarray) -> dict[str, float]:
+    """Write what identifies units without healthy recordings, and compare it with torch and the float64 network.
 
     Parameters
     ----------
@@ -50,24 +89,51 @@ def export_onnx(network: Network, path: str | Path, check_on: np.ndarray) -> dic
 
     Raises
     ------
-    InputError : the file cannot be written
+    InputError : an identifier without a network, or a file that cannot be written
     """
+    network = network_of(identifier)
+    x = np.asarray(check_on, np.float32)
+    exact = network.predict(x.astype(float))
+    return _export(torch_module(network), {"features": x}, path, exact, network.scaler.fault_scale)
+
+
+def export_calibrated_onnx(
+    identifier: Identifier, path: str | Path, check_on: np.ndarray, unit: np.ndarray
+) -> dict[str, float]:
+    """Write what identifies units with healthy recordings, and compare it as ``export_onnx`` does.
+
+    Parameters
+    ----------
+    path : file to write; beside ``features`` an input ``unit`` (run, 6), of nine features (run, 9), or one row for
+        all runs: R, k (and L) of the healthy unit at 20 degC
+    unit : of that shape, what is compared with
+    """
+    network = network_of(identifier.calibrated)
+    x, own = np.asarray(check_on, np.float32), np.atleast_2d(np.asarray(unit, np.float32))
+    exact = identifier.predict(x.astype(float), unit=own.astype(float))
+    inputs = {"features": x, "unit": own}
+    return _export(calibrated_module(identifier), inputs, path, exact, network.scaler.fault_scale)
+
+
+def _export(
+    module, inputs: Mapping[str, np.ndarray], path: str | Path, exact: np.ndarray, scale: np.ndarray
+) -> dict[str, float]:
     import onnxruntime
     import torch
 
-    module = torch_module(network)
-    x = torch.from_numpy(np.asarray(check_on, np.float32))
+    tensors = tuple(torch.from_numpy(x) for x in inputs.values())
+    axes = {"features": {0: "run"}, "unit": {0: "unit"}, "faults": {0: "run"}}
 
     def write(temporary: Path) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the exporter announces its successor, which needs a further package
             torch.onnx.export(
                 module,
-                (x,),
+                tensors,
                 str(temporary),
-                input_names=["features"],
+                input_names=list(inputs),
                 output_names=["faults"],
-                dynamic_axes={"features": {0: "run"}, "faults": {0: "run"}},
+                dynamic_axes={name: axes[name] for name in (*inputs, "faults")},
                 dynamo=False,
             )
 
@@ -76,11 +142,9 @@ def export_onnx(network: Network, path: str | Path, check_on: np.ndarray) -> dic
         session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     except Exception as error:
         raise InputError(f"{path}: the exported network cannot be read back ({error})") from error
-    (got,) = session.run(None, {"features": x.numpy()})
+    (got,) = session.run(None, dict(inputs))
     with torch.no_grad():
-        reference = module(x).numpy()
-    exact = network.predict(x.numpy().astype(float))
-    scale = network.scaler.fault_scale
+        reference = module(*tensors).numpy()
     difference = np.max(np.abs(got - reference), axis=0)
     return {
         "against_torch": float(np.max(difference / scale)),

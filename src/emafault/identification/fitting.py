@@ -1,7 +1,7 @@
 """Identifiers from simulated runs: what is learnt, by whom, and on which rows the intervals are calibrated.
 
 A closed form learns nothing; a network learns from rows, is the work of a ``Recipe``, and has its intervals from a
-``Calibration`` on rows that it, or the network of their fold, was not trained on.
+``HeldOut`` on rows that it, or the network of their fold, was not trained on.
 """
 
 from collections.abc import Mapping
@@ -113,7 +113,7 @@ class Lesson:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class HeldOut:
     """Which rows calibrate a network's intervals.
 
     ``cross``: all of them, by ``folds`` further networks, each judged on the rows that it has not learnt; ``split``:
@@ -158,7 +158,7 @@ class Fit:
 
 
 def fit_identifier(
-    rows: TrainingRows, prior: Prior, recipe: Recipe | None = None, calibration: Calibration | None = None
+    rows: TrainingRows, prior: Prior, recipe: Recipe | None = None, held_out: HeldOut | None = None
 ) -> Fit:
     """The network of a recipe, or without one the closed form, with intervals.
 
@@ -172,7 +172,7 @@ def fit_identifier(
     rows = rows.identified()
     if recipe is None:
         return Fit(fit_closed_form(rows, prior))
-    return fit_network(rows, prior, recipe, calibration or Calibration())
+    return fit_network(rows, prior, recipe, held_out or HeldOut())
 
 
 def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
@@ -197,7 +197,7 @@ def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
     return replace(identifier, intervals=found, intervals_of_units=of_units)
 
 
-def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, calibration: Calibration) -> Fit:
+def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: HeldOut) -> Fit:
     """A network; of nine features that learns from units that differ, a second one for units with a healthy recording.
 
     For how nine features are best weighed depends on what of the unit is known. Nine features leave more than a fault,
@@ -207,12 +207,12 @@ def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, calibration: C
     lesson = Lesson(rows.features if rows.scaled == 9 else nominal.features, nominal)
     trained = recipe.train(lesson)
     identifier = replace(_untold(rows, nominal, prior), network=trained.network, healthy=learnt_healthy(nominal, prior))
-    identifier = replace(identifier, intervals=calibration.intervals(identifier, trained, lesson, recipe))
+    identifier = replace(identifier, intervals=held_out.intervals(identifier, trained, lesson, recipe))
     if rows.scaled == 9 and rows.units is not None and nominal.covariance is not None:
         shown = beside_a_healthy_recording(nominal, recipe.seed)
         lesson = Lesson(shown.features, shown)
         other = recipe.train(lesson)
-        of_units = calibration.intervals(identifier, other, lesson, recipe)
+        of_units = held_out.intervals(identifier, other, lesson, recipe)
         identifier = replace(identifier, intervals_of_units=of_units, network_of_units=other.network)
     return Fit(identifier, trained)
 

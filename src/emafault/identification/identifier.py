@@ -91,7 +91,7 @@ class Identifier:
         InputError : features of the wrong shape, or nine without covariance for the closed form
         """
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        return self._beside(unit).at_nominal(features, covariance)
+        return (self if unit is None else self.calibrated).at_nominal(features, covariance)
 
     def interval(
         self,
@@ -109,7 +109,7 @@ class Identifier:
         """
         untold = covariance is None
         features, covariance = self._nominal(features, covariance, unit, unit_covariance)
-        own = self._beside(unit)
+        own = self if unit is None else self.calibrated
         value, variance = own.at_nominal(features, covariance), own.variance_at_nominal(features, covariance)
         if untold and variance is not None:  # that of the unit alone
             variance = variance + own.intervals.typical_variance
@@ -203,15 +203,18 @@ class Identifier:
             raise InputError("covariance: none given, the closed form of nine features weighs them by it")
         return posterior(features, covariance, self.actuator, self.alpha_m, self.known)
 
-    def _beside(self, unit: np.ndarray | None) -> "Identifier":
-        """What identifies features of a unit with healthy recordings, or of one without."""
-        if unit is None:
-            return self
+    @property
+    def calibrated(self) -> "Identifier":
+        """What identifies features of a unit with healthy recordings."""
         return replace(
             self,
             intervals=self.intervals_of_units or self.intervals,
             network=self.network_of_units or self.network,
         )
+
+    def nominal_unit(self, width: int) -> np.ndarray:
+        """R, k and, of a ``width`` of nine, L of the healthy unit that features of other units are scaled to."""
+        return nominal_nine(self.actuator)[: logarithmic(width)] if self.healthy is None else self.healthy
 
     def _nominal(self, features, covariance, unit, unit_covariance=None) -> tuple[np.ndarray, np.ndarray | None]:
         features = np.atleast_2d(np.asarray(features, float))
@@ -219,12 +222,11 @@ class Identifier:
         if features.shape[1] != width or width not in (6, 8, 9):
             raise InputError(f"features: got {features.shape[1]} a run, this identifier accepts {width}")
         scaled = logarithmic(width)  # what a unit has a value of its own of
-        nominal = nominal_nine(self.actuator)[:scaled]
         if covariance is not None:
             covariance = np.broadcast_to(np.asarray(covariance, float), (len(features), scaled, scaled))
         if unit is not None:
             unit = np.broadcast_to(np.asarray(unit, float), (len(features), scaled))
-            scale = (nominal if self.healthy is None else self.healthy) / unit
+            scale = self.nominal_unit(width) / unit
             features = np.concatenate([features[:, :scaled] * scale, features[:, scaled:]], axis=1)
             if covariance is not None:
                 covariance = covariance * scale[:, :, None] * scale[:, None, :]

@@ -21,6 +21,7 @@ from ..progress import progress, say
 from .features import read_features
 
 HISTORY = "history.json"
+OFF = 0.01  # relative, of the unit for which an exported network is compared
 
 
 def write_json(path: str | Path, value: Any) -> None:
@@ -151,24 +152,34 @@ def _trials(path: str) -> list[Trial]:
         raise InputError(f"{path}: not what a worker of the search has written ({error})") from error
 
 
-def export_network(folder: str | Path, features: str, model: str, source: str, check: str) -> None:
-    """Export a trained network (its first seed) to ONNX, checked against torch on given features, and to C99.
+def export_network(folder: str | Path, features: str, model: str, calibrated: str, source: str, check: str) -> None:
+    """Export a trained identifier's networks (of its first seed) to ONNX and to C99.
 
-    ``check`` gets the differences, and what one identification by the C99 takes.
+    Parameters
+    ----------
+    folder : of the identifier
+    features : table on which the ONNX files are compared with torch, those of units with healthy recordings as if the
+        unit were ``OFF`` above the nominal one in R, k and L
+    model, calibrated : ONNX files to write, of a unit without and with healthy recordings
+    source : C99 file to write, of both
+    check : JSON file to write: the differences, and what one identification by the C99 takes
 
     Raises
     ------
     InputError : a folder without a network, or a file that cannot be written
     """
     from ..identification.c99 import write_c
-    from ..identification.export import export_onnx
+    from ..identification.export import export_calibrated_onnx, export_onnx
     from ..identification.identifier import Identifier
 
-    network = Identifier.load(seed_folder(folder, 0)).network
-    if network is None:
+    identifier = Identifier.load(seed_folder(folder, 0))
+    if identifier.network is None:
         raise InputError(f"{folder}: holds no network to export")
-    taken = write_c(network, source)
-    write_json(check, export_onnx(network, model, read_features(features).identified().inputs) | {"c99": taken})
+    x = read_features(features).identified().inputs
+    unit = (1.0 + OFF) * identifier.nominal_unit(x.shape[1])
+    told = export_onnx(identifier, model, x)
+    told_calibrated = export_calibrated_onnx(identifier, calibrated, x, unit)
+    write_json(check, {**told, "calibrated": told_calibrated, "c99": write_c(identifier, source)})
 
 
 def histories_in(estimators: Sequence[str]) -> list[str]:

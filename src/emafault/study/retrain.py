@@ -16,7 +16,7 @@ from ..dataset import as_batch, sample_runs, simulate_and_measure
 from ..equations.carried import entries
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..identification.fitting import Calibration, Prior, Recipe, TrainingRows, fit_network
+from ..identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_network
 from ..io.bench import read_bench
 from ..io.recording import Recording
 from ..plain import read_json
@@ -85,7 +85,7 @@ def retrain_network(
         rows, estimates = TrainingRows(features.six, faults).identified(), []
         for seed in progress(range(spec["seeds"]), f"train {kind}", spec["seeds"]):
             recipe = Recipe(spec["network"], spec["training"], seed)
-            fit = fit_network(rows, Prior(actuator), recipe, Calibration("split"))
+            fit = fit_network(rows, Prior(actuator), recipe, HeldOut("split"))
             estimates.append([fit.identifier.predict(f.six)[0] for f in measured.values()])
         found = np.mean(estimates, axis=0)
         off = 100.0 * (found - np.array([truths[n] for n in measured])) / width
