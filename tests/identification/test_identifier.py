@@ -8,11 +8,11 @@ import pytest
 
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
-from emafault.identification import evaluation
+from emafault.identification import evaluation, fitting
 from emafault.identification.export import export_onnx
 from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
 from emafault.identification.identifier import Identifier
-from emafault.identification.intervals import ConformalIntervals, coverage
+from emafault.identification.intervals import ConformalIntervals, coverage, worse_than_folds
 from emafault.identification.posterior import Knowledge, nine_forward, nominal_nine
 from emafault.reconstruction.features import Features
 
@@ -84,12 +84,34 @@ def test_conformal_rank_and_refusals():
         ConformalIntervals.calibrate(residuals[:5], None, "")
 
 
+def test_a_network_that_ended_in_a_worse_optimum_is_trained_from_another_start(make_set, actuator, monkeypatch):
+    known, new = rows_of(make_set(400, 1)), make_set(800, 2)
+    given, seeds = fitting.train, []
+
+    def train(features, faults, network, training, seed):
+        """The first start of the whole has not left its beginning."""
+        seeds.append(seed)
+        return given(features, faults, network, {**training, "epochs": 2} if seed == 7 else training, seed)
+
+    monkeypatch.setattr(fitting, "train", train)
+    fit = fit_identifier(known, Prior(actuator), replace(RECIPES["network"], seed=7))
+    assert sorted(seeds) == [7, *(7 + 1000 * start for start in range(1, 7))]  # folds, and one more start
+    assert len(fit.trained.curves[0].train) > 5
+    error = np.abs(fit.identifier.predict(new.features) - new.faults).mean(axis=0)
+    assert error[5] < 0.6 and error[0] < 2e-3
+    monkeypatch.setattr(fitting, "STARTS", 1)
+    stuck = fit_identifier(known, Prior(actuator), replace(RECIPES["network"], seed=7)).identifier
+    width = [np.ptp(i.interval(new.features, 0.9, new.covariance), axis=0) for i in (fit.identifier, stuck)]
+    assert np.all(width[1][:, 5] > 2.0 * width[0][:, 5])
+    assert np.abs(stuck.predict(new.features) - new.faults).mean(axis=0)[5] > 3.0 * error[5]
+
+
 def test_intervals_are_as_wide_as_a_network_that_is_worse_than_its_folds():
     rng = np.random.default_rng(4)
     folds, own, new = rng.normal(size=(600, 6)), rng.normal(size=(90, 6)), rng.normal(size=(4000, 6))
     off = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.5])  # of the network's errors over those of its folds
     plain = ConformalIntervals.calibrate(folds, None, "cross")
-    told = plain.of_a_worse(own * off, folds)
+    told = plain.widened(worse_than_folds(own * off, folds))
     inside = np.mean(np.abs(new * off) <= told.half_width(0.9, None, 1), axis=0)
     assert np.all(np.abs(inside - 0.9) < 0.04)
     assert np.mean(np.abs(new * off) <= plain.half_width(0.9, None, 1), axis=0)[5] < 0.77

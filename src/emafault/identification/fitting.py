@@ -13,8 +13,9 @@ import numpy as np
 from .. import closed_form
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
+from ..faults import FAULT_NAMES
 from .identifier import Identifier
-from .intervals import ConformalIntervals
+from .intervals import ConformalIntervals, worse_than_folds
 from .network import logarithmic
 from .posterior import Knowledge, nominal_nine
 from .settings import NetworkSettings, TrainingSettings
@@ -23,6 +24,7 @@ from .training import TrainedNetwork, train
 LEAST_ROWS = 10  # that an identifier is made from
 LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
 KINDS = ("cross", "split")
+STARTS = 4  # of a network, at most, until it errs no more than those of its folds
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,10 @@ class Recipe:
     training: Mapping[str, Any] | TrainingSettings | None = None
     seed: int = 0
 
-    def train(self, lesson: "Lesson", rows: Any = slice(None), fold: int = 0) -> TrainedNetwork:
-        """A network that learnt some rows; each fold starts from a seed of its own."""
-        start = self.seed + 1000 * fold
-        return train(lesson.learnt[rows], lesson.shown.faults[rows], self.network, self.training, start)
+    def train(self, lesson: "Lesson", rows: Any = slice(None), start: int = 0) -> TrainedNetwork:
+        """A network that learnt some rows; each start has a seed of its own."""
+        seed = self.seed + 1000 * start
+        return train(lesson.learnt[rows], lesson.shown.faults[rows], self.network, self.training, seed)
 
 
 @dataclass(frozen=True)
@@ -127,13 +129,33 @@ class HeldOut:
         if self.kind not in KINDS:
             raise InputError(f"intervals: got '{self.kind}', accepted are {' and '.join(KINDS)}")
 
-    def intervals(
-        self, identifier: Identifier, trained: TrainedNetwork, lesson: Lesson, recipe: Recipe
-    ) -> ConformalIntervals:
-        """Intervals of a network that learnt a lesson."""
+    def calibrated(
+        self, identifier: Identifier, lesson: Lesson, recipe: Recipe
+    ) -> tuple[TrainedNetwork, ConformalIntervals]:
+        """A network that learnt a lesson, and its intervals.
+
+        Folds stand for the network where it ends in as good an optimum as theirs: one that errs more on its test rows,
+        by no chance, is trained again from another start.
+        """
+        trained = recipe.train(lesson)
         if self.kind == "split":
             own = lesson.judged(identifier, trained, trained.test_rows)
-            return ConformalIntervals.calibrate(*own, "split, test rows")
+            return trained, ConformalIntervals.calibrate(*own, "split, test rows")
+        intervals, of_folds = self.by_folds(identifier, lesson, recipe)
+        if not len(trained.test_rows):
+            return trained, intervals
+        best, worse = trained, np.full(len(FAULT_NAMES), np.inf)
+        for start in range(STARTS):
+            tried = trained if not start else recipe.train(lesson, start=self.folds + start)
+            ratio = worse_than_folds(lesson.judged(identifier, tried, tried.test_rows)[0], of_folds)
+            if np.prod(ratio) < np.prod(worse):
+                best, worse = tried, ratio
+            if np.all(worse == 1.0):
+                break
+        return best, intervals.widened(worse)
+
+    def by_folds(self, identifier: Identifier, lesson: Lesson, recipe: Recipe) -> tuple[ConformalIntervals, np.ndarray]:
+        """Intervals by networks that each have left a fold out, and their errors (row, 6)."""
         every = np.arange(len(lesson.learnt))
         order = np.random.default_rng([recipe.seed, 20]).permutation(every)
         parts = []
@@ -143,10 +165,7 @@ class HeldOut:
         residuals = np.concatenate([error for error, _ in parts])
         told = [variance for _, variance in parts if variance is not None]
         variance = np.concatenate(told) if told else None
-        found = ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {self.folds} folds")
-        if not len(trained.test_rows):
-            return found
-        return found.of_a_worse(lesson.judged(identifier, trained, trained.test_rows)[0], residuals)
+        return ConformalIntervals.calibrate(residuals, variance, f"cross-conformal, {self.folds} folds"), residuals
 
 
 @dataclass(frozen=True)
@@ -205,14 +224,13 @@ def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: Held
     """
     nominal = rows.of_nominal(prior.actuator)
     lesson = Lesson(rows.features if rows.scaled == 9 else nominal.features, nominal)
-    trained = recipe.train(lesson)
-    identifier = replace(_untold(rows, nominal, prior), network=trained.network, healthy=learnt_healthy(nominal, prior))
-    identifier = replace(identifier, intervals=held_out.intervals(identifier, trained, lesson, recipe))
+    blank = _untold(rows, nominal, prior)
+    trained, intervals = held_out.calibrated(blank, lesson, recipe)
+    identifier = replace(blank, network=trained.network, healthy=learnt_healthy(nominal, prior), intervals=intervals)
     if rows.scaled == 9 and rows.units is not None and nominal.covariance is not None:
         shown = beside_a_healthy_recording(nominal, recipe.seed)
         lesson = Lesson(shown.features, shown)
-        other = recipe.train(lesson)
-        of_units = held_out.intervals(identifier, other, lesson, recipe)
+        other, of_units = held_out.calibrated(identifier, lesson, recipe)
         identifier = replace(identifier, intervals_of_units=of_units, network_of_units=other.network)
     return Fit(identifier, trained)
 

@@ -7,7 +7,8 @@ from cross-conformal folds, each predicted by a network trained without it (Vovk
 doi:10.1007/s10472-013-9368-4), or from a held-out split. A half width is the ceil((n + 1) level)-th smallest score
 times the scale, about the prediction of the network trained on all parts. For ``split`` coverage is at least the
 level on average over exchangeable rows; for ``cross`` that is approximate, slightly wide since fold networks see
-fewer rows, and too narrow where the network has ended in a worse optimum than theirs: its own test rows tell.
+fewer rows, and too narrow where the network has ended in a worse optimum than theirs. Its own test rows tell: it is
+trained again from another start, and what is still worse after ``fitting.STARTS`` of them widens the intervals.
 """
 
 from dataclasses import dataclass, replace
@@ -44,14 +45,9 @@ class ConformalIntervals:
         scores = np.sort(np.abs(residuals) / np.sqrt(variance + missed), axis=0)
         return cls(method, scores, missed, np.median(variance, axis=0))
 
-    def of_a_worse(self, own: np.ndarray, of_folds: np.ndarray) -> "ConformalIntervals":
-        """As wide as a network's ``own`` residuals on its test rows ask for where ``of_folds`` are less by no chance.
-
-        Both (row, output). An output whose errors the folds stand for keeps its scores.
-        """
-        ratio = np.sqrt(np.mean(own**2, axis=0) / np.maximum(np.mean(of_folds**2, axis=0), 1e-300))
-        spread = np.sqrt(0.5 / len(own) + 0.5 / len(of_folds))  # of a ratio of root mean squares
-        return replace(self, scores=self.scores * np.where(ratio > 1.0 + WORSE * spread, ratio, 1.0))
+    def widened(self, ratio: np.ndarray) -> "ConformalIntervals":
+        """Intervals that are ``ratio`` (output,) times as wide."""
+        return replace(self, scores=self.scores * ratio)
 
     @classmethod
     def gaussian(cls, method: str) -> "ConformalIntervals":
@@ -108,6 +104,16 @@ class ConformalIntervals:
             if np.any(variances[key] < 0.0):
                 raise InputError(f"intervals.{key}: got {variances[key].tolist()}, accepted are numbers from 0")
         return cls(plain["method"], scores, **variances)
+
+
+def worse_than_folds(own: np.ndarray, of_folds: np.ndarray) -> np.ndarray:
+    """By how much a network's ``own`` errors on its test rows exceed those ``of_folds``, by output, 1 where by chance.
+
+    Both (row, output).
+    """
+    ratio = np.sqrt(np.mean(own**2, axis=0) / np.maximum(np.mean(of_folds**2, axis=0), 1e-300))
+    spread = np.sqrt(0.5 / len(own) + 0.5 / len(of_folds))  # of a ratio of root mean squares
+    return np.where(ratio > 1.0 + WORSE * spread, ratio, 1.0)
 
 
 def coverage(low: np.ndarray, high: np.ndarray, truth: np.ndarray) -> dict[str, float]:
