@@ -295,6 +295,30 @@ def test_a_bias_that_a_healthy_record_takes_out_is_not_in_its_intervals(fresh, t
     assert widths["without"] > 100.0 and widths["with"] < 10.0
 
 
+@pytest.mark.parametrize("estimator", RECIPES)
+def test_a_bias_that_changes_with_the_fault_is_that_of_a_healthy_record_at_the_healthy_point(
+    fresh, training, actuator, estimator
+):
+    healthy, nominal = np.repeat([1.1, 0.9], 3), nominal_nine(actuator)[:6]
+
+    def biased(data):
+        turns, along = data.faults[:, :3], 0.2 * data.faults[:, 3:4]
+        return data.features * (healthy + np.concatenate([1.5 * turns, along - turns], axis=1))
+
+    rows = rows_of(training, biased(training), covariance=False)
+    identifier = fit_identifier(rows, Prior(actuator), RECIPES[estimator]).identifier
+    np.testing.assert_allclose(np.diagonal(identifier.noise), np.repeat(np.diagonal(NOISE), 3), rtol=0.3)
+    if estimator == "network":  # the mean over all faults is 1.175 and 0.85
+        np.testing.assert_allclose(identifier.nominal_unit(6) / nominal, healthy, rtol=2e-3)
+    scale = np.repeat([1.01, 0.995], 3)
+    measured = nominal * healthy * scale
+    spread = np.kron(NOISE, np.eye(3)) * measured[:, None] * measured
+    units = np.random.default_rng(8).multivariate_normal(measured, spread, len(fresh.faults))
+    told = identifier.noise * measured[:, None] * measured
+    low, high = identifier.interval(biased(fresh) * scale, 0.9, None, units, told)
+    assert abs(coverage(low, high, fresh.faults)["mean"] - 0.9) < 0.03
+
+
 def test_a_network_of_nine_features_weighs_them_as_a_healthy_record_leaves_the_unit_known(actuator, tmp_path):
     known, nominal = Knowledge(R=0.01, k=0.005, L=0.03), nominal_nine(actuator)
     relative = np.kron(np.diag([2e-3, 1e-3, 5e-4]) ** 2, np.eye(3))

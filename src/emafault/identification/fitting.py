@@ -6,6 +6,7 @@ A closed form learns nothing; a network learns from rows, is the work of a ``Rec
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from .posterior import Knowledge, nominal_nine
 from .settings import NetworkSettings, TrainingSettings
 from .training import TrainedNetwork, train
 
+ROWS_A_TERM = 10  # of the polynomial of a reconstruction's bias
 LEAST_ROWS = 10  # that an identifier is made from
 LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
 KINDS = ("cross", "split")
@@ -210,7 +212,7 @@ def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
     if rows.covariance is not None:
         return replace(identifier, intervals=found)
     unbiased = nominal.features.copy()
-    unbiased[:, : rows.scaled] *= nominal_nine(prior.actuator)[: rows.scaled] / learnt_healthy(nominal, prior)
+    unbiased[:, : rows.scaled] /= HealthyPoint.of(nominal, prior).bias
     left = identifier.at_nominal(unbiased) - nominal.faults
     of_units = ConformalIntervals.calibrate(left, None, "closed form, all rows less their bias")
     return replace(identifier, intervals=found, intervals_of_units=of_units)
@@ -226,7 +228,12 @@ def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: Held
     lesson = Lesson(rows.features if rows.scaled == 9 else nominal.features, nominal)
     blank = _untold(rows, nominal, prior)
     trained, intervals = held_out.calibrated(blank, lesson, recipe)
-    identifier = replace(blank, network=trained.network, healthy=learnt_healthy(nominal, prior), intervals=intervals)
+    identifier = replace(
+        blank,
+        network=trained.network,
+        healthy=HealthyPoint.of(nominal, prior).of_nominal(prior.actuator),
+        intervals=intervals,
+    )
     if rows.scaled == 9 and rows.units is not None and nominal.covariance is not None:
         shown = beside_a_healthy_recording(nominal, recipe.seed)
         lesson = Lesson(shown.features, shown)
@@ -251,8 +258,7 @@ def _untold(rows: TrainingRows, nominal: TrainingRows, prior: Prior) -> Identifi
     none = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
     noise = None
     if rows.covariance is None and rows.scaled == 6:
-        ratio = over_laws(nominal, prior)
-        noise = np.cov(ratio / np.mean(ratio, axis=0), rowvar=False) + LEAST_NOISE * np.eye(6)
+        noise = HealthyPoint.of(nominal, prior).covariance + LEAST_NOISE * np.eye(6)
     low, high = rows.features.min(axis=0), rows.features.max(axis=0)
     return Identifier(
         prior.actuator, prior.alpha_m, prior.known.lag, none, None, low, high, known=prior.known, noise=noise
@@ -272,14 +278,50 @@ def over_laws(rows: TrainingRows, prior: Prior) -> np.ndarray:
     return min(ratios, key=lambda r: float(np.sum(np.var(r, axis=0))))
 
 
-def learnt_healthy(rows: TrainingRows, prior: Prior) -> np.ndarray:
-    """R, k and, of nine, L of the healthy nominal unit at 20 degC as a reconstruction, biased or not, gives them.
+@dataclass(frozen=True)
+class HealthyPoint:
+    """R, k and, of nine features, L of a healthy unit as a reconstruction, biased or not, gives them over the true.
 
-    A network learns the bias of its features along with the faults, so a unit must be compared with the nominal one
-    as reconstructed, not as it is. The bias is the mean ratio of the features to the fault laws' R and k, where it
-    differs from 1 by more than chance.
+    The ratio of the features to the fault laws is fitted as a polynomial of the fault, quadratic where rows allow it,
+    and taken without turns and eccentricity at the temperatures of the rows: a bias that changes with the fault is not
+    that of a healthy recording. What the fit leaves, and what the bias changes by with temperature, is what a healthy
+    recording scatters by.
     """
-    ratio = over_laws(rows, prior)
-    bias = np.mean(ratio, axis=0)
-    chance = 4.0 * np.std(ratio, axis=0) / np.sqrt(len(ratio))
-    return nominal_nine(prior.actuator)[: rows.scaled] * np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
+
+    bias: np.ndarray  # (6,) or (9,), 1 where it differs from that by no more than chance
+    covariance: np.ndarray  # relative, of one healthy recording
+
+    @classmethod
+    def of(cls, rows: TrainingRows, prior: Prior) -> "HealthyPoint":
+        """From rows of the nominal unit."""
+        ratio = over_laws(rows, prior)
+        healthy = rows.faults * (np.arange(rows.faults.shape[1]) == FAULT_NAMES.index("dT"))
+        mean, spread = rows.faults.mean(axis=0), rows.faults.std(axis=0)
+        spread = np.where(spread > 0.0, spread, 1.0)
+        terms, at = (_polynomial((x - mean) / spread, len(ratio)) for x in (rows.faults, healthy))
+        weights = np.linalg.pinv(terms)
+        left = ratio - terms @ (weights @ ratio)
+        noise = left.T @ left / (len(ratio) - np.linalg.matrix_rank(terms))
+        of_healthy = at @ (weights @ ratio)
+        bias = of_healthy.mean(axis=0)
+        chance = 4.0 * np.sqrt(np.diagonal(noise)) * np.linalg.norm(at.mean(axis=0) @ weights)
+        bias = np.where(np.abs(bias - 1.0) < chance, 1.0, bias)
+        return cls(bias, (noise + np.cov(of_healthy, rowvar=False)) / np.outer(bias, bias))
+
+    def of_nominal(self, actuator: ActuatorParameters) -> np.ndarray:
+        """(6,) or (9,) R0 (ohm), k0 (V s/rad) and L0 (H) of the nominal unit as they are reconstructed."""
+        return nominal_nine(actuator)[: len(self.bias)] * self.bias
+
+
+def _polynomial(x: np.ndarray, rows: int) -> np.ndarray:
+    """(run, term) products of up to two columns, or as many as there are ten rows each for."""
+    columns = range(x.shape[1])
+    terms = [np.ones((len(x), 1))]
+    for degree in (1, 2):
+        terms.append(
+            np.stack([np.prod(x[:, c], axis=1) for c in combinations_with_replacement(columns, degree)], axis=1)
+        )
+        if sum(t.shape[1] for t in terms) * ROWS_A_TERM > rows:
+            terms.pop()
+            break
+    return np.concatenate(terms, axis=1)
