@@ -116,6 +116,10 @@ def test_intervals_are_as_wide_as_a_network_that_is_worse_than_its_folds():
     assert np.all(np.abs(inside - 0.9) < 0.04)
     assert np.mean(np.abs(new * off) <= plain.half_width(0.9, None, 1), axis=0)[5] < 0.77
     assert np.array_equal(told.scores[:, :5], plain.scores[:, :5])  # what differs by chance stays
+    every = worse_than_folds(own * 1.2, folds)  # each by hardly more than chance, all of them by far more
+    assert np.all(every > 1.0) and np.prod(every) ** (1.0 / 6.0) == pytest.approx(1.2, rel=0.08)
+    alone = worse_than_folds(own * np.array([1.2, 1.0, 1.0, 1.0, 1.0, 1.0]), folds)
+    assert np.all(alone == 1.0)
 
 
 @pytest.mark.parametrize("estimator", ["network", "closed_form"])

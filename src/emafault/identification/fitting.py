@@ -136,20 +136,19 @@ class HeldOut:
     ) -> tuple[TrainedNetwork, ConformalIntervals]:
         """A network that learnt a lesson, and its intervals.
 
-        Folds stand for the network where it ends in as good an optimum as theirs: one that errs more on its test rows,
-        by no chance, is trained again from another start.
+        Folds stand for the network where it ends in as good an optimum as theirs: one that errs more on the rows that
+        it did not learn, by no chance, is trained again from another start.
         """
         trained = recipe.train(lesson)
         if self.kind == "split":
             own = lesson.judged(identifier, trained, trained.test_rows)
             return trained, ConformalIntervals.calibrate(*own, "split, test rows")
         intervals, of_folds = self.by_folds(identifier, lesson, recipe)
-        if not len(trained.test_rows):
-            return trained, intervals
         best, worse = trained, np.full(len(FAULT_NAMES), np.inf)
         for start in range(STARTS):
             tried = trained if not start else recipe.train(lesson, start=self.folds + start)
-            ratio = worse_than_folds(lesson.judged(identifier, tried, tried.test_rows)[0], of_folds)
+            unlearnt = np.concatenate([tried.validation_rows, tried.test_rows])
+            ratio = worse_than_folds(lesson.judged(identifier, tried, unlearnt)[0], of_folds)
             if np.prod(ratio) < np.prod(worse):
                 best, worse = tried, ratio
             if np.all(worse == 1.0):

@@ -7,8 +7,9 @@ from cross-conformal folds, each predicted by a network trained without it (Vovk
 doi:10.1007/s10472-013-9368-4), or from a held-out split. A half width is the ceil((n + 1) level)-th smallest score
 times the scale, about the prediction of the network trained on all parts. For ``split`` coverage is at least the
 level on average over exchangeable rows; for ``cross`` that is approximate, slightly wide since fold networks see
-fewer rows, and too narrow where the network has ended in a worse optimum than theirs. Its own test rows tell: it is
-trained again from another start, and what is still worse after ``fitting.STARTS`` of them widens the intervals.
+fewer rows, and too narrow where the network has ended in a worse optimum than theirs. The rows that it did not learn
+tell: it is trained again from another start, and what is still worse after ``fitting.STARTS`` of them widens the
+intervals.
 """
 
 from dataclasses import dataclass, replace
@@ -107,13 +108,17 @@ class ConformalIntervals:
 
 
 def worse_than_folds(own: np.ndarray, of_folds: np.ndarray) -> np.ndarray:
-    """By how much a network's ``own`` errors on its test rows exceed those ``of_folds``, by output, 1 where by chance.
+    """By how much a network's ``own`` errors on rows that it did not learn exceed those ``of_folds``, by output.
 
-    Both (row, output).
+    Both (row, output). 1 where an output is worse by no more than chance, unless all those together are by more.
     """
     ratio = np.sqrt(np.mean(own**2, axis=0) / np.maximum(np.mean(of_folds**2, axis=0), 1e-300))
     spread = np.sqrt(0.5 / len(own) + 0.5 / len(of_folds))  # of a ratio of root mean squares
-    return np.where(ratio > 1.0 + WORSE * spread, ratio, 1.0)
+    worse = ratio > 1.0 + WORSE * spread
+    others = np.maximum(ratio[~worse], 1e-300)
+    if len(others) and np.exp(np.mean(np.log(others))) > 1.0 + WORSE * spread / np.sqrt(len(others)):
+        worse[:] = True
+    return np.where(worse, np.maximum(ratio, 1.0), 1.0)
 
 
 def coverage(low: np.ndarray, high: np.ndarray, truth: np.ndarray) -> dict[str, float]:
