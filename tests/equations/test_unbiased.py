@@ -111,3 +111,17 @@ def test_commutations_tell_the_inductance_without_end_currents(command, interval
         power, found = power + column @ column, found - column @ residual
     assert power**-0.5 < 0.02  # relative, in one recording: less than the tolerance
     assert found / power == pytest.approx(scale - 1.0, abs=4.0 * power**-0.5)
+
+
+@pytest.mark.parametrize("tau", [1e-5, 1e-4, 2e-3])
+def test_a_filter_of_the_speed_filters_the_noise_of_the_angle(tau):
+    """Otherwise a short time constant would be told by how much noise it leaves, and not by what lags."""
+    effects = {"speed_latency": {"tau": tau}}
+    recording = recorded("sine", effects=effects, interval=5e-5)
+    machine = machine_of({"a.nc": recording})
+    values = {n: v for n, v in truth(machine, recording, effects).items() if n in machine.parameters}
+    block = next(b for b in machine.blocks(values, "a.nc") if b.equation == "sensor_speed")
+    left = whiten(block.bands, block.usable, np.array(block.residual)[:, None])[block.usable, 0]
+    rows = len(left)
+    assert np.mean(left**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / rows))
+    assert all(abs(left[k:] @ left[:-k]) / rows < 4.0 / np.sqrt(rows) for k in (1, 2, 3))

@@ -7,6 +7,8 @@ from .dual import Dual
 from .point import State, effect_name
 from .terms import with_hook
 
+LITTLE = 0.01  # of the variance: covariances below it do not count
+
 
 def residual(state: State) -> Dual:
     """Recorded less predicted speed (rad/s).
@@ -31,14 +33,17 @@ def seen_speed(state: State, w: Dual) -> Dual:
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
-    """Diagonals of the noise's covariance ((rad/s)2)."""
+    """Diagonals of the noise's covariance ((rad/s)2): what the sensor makes of the angle's noise, too."""
     rec = state.rec
-    angle = (rec.noise.angle / rec.interval) ** 2
+    of_angle = np.array([1.0, -1.0])
+    for m in with_hook("response"):
+        of_angle = np.convolve(of_angle, m.response(state.p.of(effect_name(m)), rec))
+    angle = (rec.noise.angle / rec.interval) ** 2 * np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
     rounded = (0.5 * rec.speed_step) ** 2  # next to a change
-    return [
-        np.full(rec.size, rec.noise.speed**2 + rounded + 2.0 * angle),
-        np.full(rec.size - 1, -angle),
-    ]
+    white = rec.noise.speed**2 + rounded
+    together = np.flatnonzero(np.abs(angle) > LITTLE * (white + angle[0]))
+    last = int(together[-1]) if len(together) else 0
+    return [np.full(rec.size, white + angle[0]), *(np.full(rec.size - m, angle[m]) for m in range(1, last + 1))]
 
 
 def usable(state: State) -> np.ndarray:

@@ -7,6 +7,7 @@ from ...first_order import followed
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
 SHORTEST = 1e-6  # s
+FADED, LONGEST = 1e-4, 500  # of a response: what is left at its end, and intervals that it has at most
 
 
 def filtered(w, interval, tau):
@@ -17,6 +18,17 @@ def filtered(w, interval, tau):
     state = followed(w, 1.0 - decay, decay)
     before = np.concatenate([[0.0], state[:-1]])
     return w + (before - w) * (tau / interval) * (1.0 - decay)
+
+
+def response(p, rec):
+    """Recorded speed after one interval's speed of one, in that interval and those that follow."""
+    tau, h = max(p("tau").value, 0.0), rec.interval
+    if tau < SHORTEST:
+        return np.ones(1)
+    decay = np.exp(-h / tau)
+    lost = (tau / h) * (1.0 - decay)
+    follow = np.arange(min(int(np.log(FADED) / np.log(decay)) + 1, LONGEST) if decay > 0.0 else 1)
+    return np.concatenate([[1.0 - lost], lost * (1.0 - decay) * decay**follow])
 
 
 def speed(p, rec, w):
