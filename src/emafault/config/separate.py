@@ -12,6 +12,15 @@ from .stages import dataset_spec, known, magnet_coefficient, pick
 RANK_BINS = 20  # of the ranks of the check of the evidence
 
 
+def _read(name: str, form: type, listed: str, accepts: str) -> dict[str, Any]:
+    """Settings of conf/NAME.yaml, checked by their form; one of them is a list that is not empty."""
+    read = read_yaml(CONF / f"{name}.yaml")
+    schema.check(read, form, name)
+    if not read[listed]:
+        schema.refuse(f"{name}.{listed}", read[listed], accepts)
+    return read
+
+
 def evidence() -> dict[str, Any]:
     """The settings of conf/evidence.yaml.
 
@@ -19,10 +28,7 @@ def evidence() -> dict[str, Any]:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    read = read_yaml(CONF / "evidence.yaml")
-    schema.check(read, schema.Evidence, "evidence")
-    if not read["benches"]:
-        schema.refuse("evidence.benches", read["benches"], "a list of one seed or more")
+    read = _read("evidence", schema.Evidence, "benches", "a list of one seed or more")
     if (read["samples"] + 1) % RANK_BINS:
         schema.refuse("evidence.samples", read["samples"], f"one less than a multiple of {RANK_BINS}")
     return read
@@ -40,10 +46,7 @@ def design() -> dict[str, Any]:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    read = read_yaml(CONF / "optimal_command.yaml")
-    schema.check(read, schema.Design, "optimal_command")
-    if not read["lengths"]:
-        schema.refuse("optimal_command.lengths", read["lengths"], "a list of one length or more (s)")
+    read = _read("optimal_command", schema.Design, "lengths", "a list of one length or more (s)")
     for name, ends in read["space"].items():
         if name not in schema.COMMANDS or name == "file":
             raise InputError(schema.unknown_key(name, "optimal_command.space", schema.COMMANDS.keys() - {"file"}))
@@ -78,10 +81,7 @@ def several_spec() -> dict[str, Any]:
     ------
     InputError : naming the key, what it got and what it accepts
     """
-    read = read_yaml(CONF / "several_recordings.yaml")
-    schema.check(read, schema.Several, "several_recordings")
-    if not read["counts"]:
-        schema.refuse("several_recordings.counts", read["counts"], "a list of one number or more")
+    read = _read("several_recordings", schema.Several, "counts", "a list of one number or more")
     own = []
     for name in read.pop("experiments"):
         config = compose(name)

@@ -59,8 +59,8 @@ def _driven_columns(block: Block, size: float, drivers: np.ndarray) -> dict[str,
     }
 
 
-def _size(block: Block) -> float:
-    """Noise of an equation's rows."""
+def _noise_of(block: Block) -> float:
+    """Standard deviation of the noise of a block's rows, the median."""
     return float(np.sqrt(np.median(block.bands[0])))
 
 
@@ -105,7 +105,7 @@ def raw_columns(
     names = [n for n in wanted if n in block.columns]
     columns = [block.columns[n] for n in names]
     if remainder:
-        more, extra = remainder_columns(block, _size(block))
+        more, extra = remainder_columns(block, _noise_of(block))
         names, columns = names + more, columns + extra
     for unit, amounts in (own or {}).items():
         more, extra = own_columns(block, unit, amounts)
@@ -161,7 +161,7 @@ def disturbance(
             if name in wanted:
                 changes[name] = more * function
     if "changes" in block.coordinates:
-        driven = _driven_columns(block, _size(block), block.coordinates["changes"])
+        driven = _driven_columns(block, _noise_of(block), block.coordinates["changes"])
         changes |= {n: c for n, c in driven.items() if n in wanted}
     changed = {n: c for n, c in changes.items() if np.any(c)}
     used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))

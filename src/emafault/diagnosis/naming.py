@@ -3,21 +3,24 @@
 Effects whose inclusions reach it only together, one standing in for the other in the sets, are a group.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
+from typing import Any
 
 from scipy.special import expit
 
 from .model import LISTED, SETTINGS, Unit
-from .search import Model, posterior
+from .search import Model, Search, posterior
 
 NAMED = 0.9
 PRESENT = 0.5  # of a remainder, from which it is more likely there than not
 #: what the controller does with what it sees is no gap of the machine
 OWN_BUSINESS = ("remainder:control", "remainder:commutation")
 MEMBERS = 4  # largest group
+MOST = 12  # sets told
+POSSIBLE = 0.1  # inclusion of a remainder, from which what is unknown is said to lie in its equation
 
 
 @dataclass(frozen=True)
@@ -132,3 +135,49 @@ def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, 
 def _meet(one: Sequence[str], other: Sequence[str]) -> bool:
     """Whether two effects act in a common equation; that of one phase is one of the electrical ones."""
     return any(a == b or a.startswith(f"{b}_") or b.startswith(f"{a}_") for a in one for b in other)
+
+
+def told_sets(
+    reading: Reading, search: Search, parameters: Callable[[Sequence[str], Model], dict[str, dict]], equation: str
+) -> list[dict[str, Any]]:
+    """Sets as a verdict tells them, with the empty set and the unknown, their probabilities adding up to one; the
+    verdict's own first.
+
+    Parameters
+    ----------
+    parameters : of the effects of a set, from its model with the widths of their priors
+    equation : where what is unknown lies
+    """
+    grouped = {e for g in reading.groups for e in g}
+    entries: list[dict[str, Any]] = [
+        {
+            "effects": list(effects), "probability": p, "group": "group 1" if grouped & set(effects) else None,
+            "parameters": parameters(effects, search.wide(model)),
+            "log_evidence_gain": float(model.log_likelihood - search.fit(()).log_likelihood),
+        }
+        for effects, p, model in reading.sets[:MOST]
+    ]  # fmt: skip
+    rest = sum(p for _, p, _ in reading.sets[MOST:])
+    empty: dict[str, Any] = {"effects": [], "probability": reading.empty, "group": None}
+    unknown: dict[str, Any] = {
+        "effects": ["unknown"], "equation": equation, "probability": reading.unknown + rest, "group": None,
+    }  # fmt: skip
+    total = sum(e["probability"] for e in (*entries, empty, unknown))
+    for e in (*entries, empty, unknown):
+        e["probability"] = round(float(e["probability"]) / total, 6)
+    if reading.verdict in ("no_gap", "described"):
+        return [empty, *entries, unknown]
+    if reading.verdict == "unknown":
+        return [unknown, *entries, empty]
+    named = set(reading.named)
+    entries.sort(key=lambda e: (not named <= set(e["effects"]), -e["probability"]))
+    return [*entries, empty, unknown]
+
+
+def possible_remainder(reading: Reading) -> str | None:
+    """Equation of the likeliest remainder, if it is possible at all."""
+    left = [k for k in reading.inclusion if k.startswith("remainder:")]
+    likeliest = min(left, key=lambda k: (-reading.inclusion[k], k), default=None)
+    if likeliest is None or reading.inclusion[likeliest] <= POSSIBLE:
+        return None
+    return likeliest.split(":", 1)[1]

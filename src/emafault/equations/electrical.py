@@ -183,7 +183,7 @@ def _slow_edges(rec, edge: int) -> list[tuple[np.ndarray, int]]:
 def switched_on(state: State, j: int) -> np.ndarray:
     """(sample,) where phase j conducts at any time of an interval or of the ``BESIDE`` next to it on either side."""
     rec = state.rec.rows_from
-    return rec.once(("switched_on", j), lambda: binary_dilation(_conducts(rec, j), iterations=BESIDE))
+    return rec.once(("switched_on", j), lambda: binary_dilation(conducts(state, j), iterations=BESIDE))
 
 
 def conducts(state: State, j: int) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
-from ..diagnosis.naming import Reading
+from ..diagnosis.naming import Reading, possible_remainder, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
@@ -155,47 +155,14 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
     return {n: (v, spread[n]) for n, v in values.items()}
 
 
-def _which(fitted: Fitted, found: Sequence[Mapping]) -> list[dict]:
-    """Sets with their probabilities and parameters, the empty set and the unknown; the verdict's own first."""
-    bench, machine, reading, search = fitted.bench, fitted.machine, fitted.reading, fitted.fit.search
-    grouped = {e for g in reading.groups for e in g}
-    entries: list[dict[str, Any]] = []
-    for effects, p, model in reading.sets[:12]:
-        inside = grouped & set(effects)
-        entries.append(
-            {
-                "effects": list(effects), "probability": p, "group": "group 1" if inside and reading.groups else None,
-                "parameters": _parameters(bench, machine, effects, search.wide(model)),
-                "log_evidence_gain": float(model.log_likelihood - search.fit(()).log_likelihood),
-            }
-        )  # fmt: skip
-    rest = sum(p for _, p, _ in reading.sets[12:])
-    empty: dict[str, Any] = {"effects": [], "probability": reading.empty, "group": None}
-    equation = _equation(reading, found)
-    unknown: dict[str, Any] = {
-        "effects": ["unknown"],
-        "equation": equation,
-        "probability": reading.unknown + rest,
-        "group": None,
-    }
-    total = sum(e["probability"] for e in (*entries, empty, unknown))
-    for e in (*entries, empty, unknown):
-        e["probability"] = round(float(e["probability"]) / total, 6)
-    if reading.verdict in ("no_gap", "described"):
-        return [empty, *entries, unknown]
-    if reading.verdict == "unknown":
-        return [unknown, *entries, empty]
-    named = set(reading.named)
-    entries.sort(key=lambda e: (not named <= set(e["effects"]), -e["probability"]))
-    return [*entries, empty, unknown]
-
-
-def _equation(reading: Reading, found: Sequence[Mapping]) -> str:
-    left = sorted((k for k in reading.inclusion if k.startswith("remainder:")), key=lambda k: -reading.inclusion[k])
-    if left and reading.inclusion[left[0]] > 0.1:
-        equation = left[0].split(":", 1)[1]
-        return EQUATION.get(equation, equation)
-    return str(found[0]["equation"]) if found else "electrical"
+def _which(fitted: Fitted, found: Sequence[Mapping]) -> list[dict[str, Any]]:
+    """Sets with their probabilities and parameters, see ``told_sets``."""
+    left = possible_remainder(fitted.reading)
+    equation = EQUATION.get(left, left) if left else str(found[0]["equation"]) if found else "electrical"
+    return told_sets(
+        fitted.reading, fitted.fit.search,
+        lambda effects, model: _parameters(fitted.bench, fitted.machine, effects, model), equation,
+    )  # fmt: skip
 
 
 def _discovered(fitted: Fitted) -> list[dict]:

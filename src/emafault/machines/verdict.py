@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..diagnosis.naming import possible_remainder, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 SCHEMA = "2.0"
 Z = 1.645  # standard deviations of a 90 % interval
-MOST = 12  # sets told
 BIASED = 0.25  # of an interval's width, by which a parameter moves that is told as biased
 SEEN = 1.0  # information over that of the prior, below which the recordings say nothing of a parameter
 
@@ -64,41 +64,18 @@ def regions(fitted: "Fitted") -> list[dict[str, Any]]:
 
 
 def _which(machine: Machine, fitted: "Fitted", found: Sequence[Mapping]) -> list[dict[str, Any]]:
-    """Sets with their probabilities and parameters, the empty set and the unknown; the verdict's own first."""
-    reading, search = fitted.reading, fitted.fit.search
-    grouped = {e for g in reading.groups for e in g}
-    entries: list[dict[str, Any]] = [
-        {
-            "effects": list(effects), "probability": p, "group": "group 1" if grouped & set(effects) else None,
-            "parameters": _parameters(machine, fitted, effects, search.wide(model)),
-            "log_evidence_gain": float(model.log_likelihood - search.fit(()).log_likelihood),
-        }
-        for effects, p, model in reading.sets[:MOST]
-    ]  # fmt: skip
-    rest = sum(p for _, p, _ in reading.sets[MOST:])
-    empty: dict[str, Any] = {"effects": [], "probability": reading.empty, "group": None}
-    unknown: dict[str, Any] = {
-        "effects": ["unknown"], "equation": _equation(fitted, found), "probability": reading.unknown + rest,
-        "group": None,
-    }  # fmt: skip
-    total = sum(e["probability"] for e in (*entries, empty, unknown))
-    for e in (*entries, empty, unknown):
-        e["probability"] = round(float(e["probability"]) / total, 6)
-    if reading.verdict in ("no_gap", "described"):
-        return [empty, *entries, unknown]
-    if reading.verdict == "unknown":
-        return [unknown, *entries, empty]
-    named = set(reading.named)
-    entries.sort(key=lambda e: (not named <= set(e["effects"]), -e["probability"]))
-    return [*entries, empty, unknown]
+    """Sets with their probabilities and parameters, see ``told_sets``."""
+    return told_sets(
+        fitted.reading, fitted.fit.search,
+        lambda effects, model: _parameters(machine, fitted, effects, model), _equation(fitted, found),
+    )  # fmt: skip
 
 
 def _equation(fitted: "Fitted", found: Sequence[Mapping]) -> str:
     """Where what is unknown lies: the remainder's equation, else that with the largest residual."""
-    inclusion = fitted.reading.inclusion
-    left = sorted((k for k in inclusion if k.startswith("remainder:")), key=lambda k: (-inclusion[k], k))
-    if left and inclusion[left[0]] > 0.1:
-        return told(left[0].split(":", 1)[1])
+    left = possible_remainder(fitted.reading)
+    if left is not None:
+        return told(left)
     if found:
         return str(found[0]["equation"])
     return told(next(r.equation for rows in fitted.recorded.rows.values() for r in rows))

@@ -23,12 +23,9 @@ def filtered(w, interval, tau):
 def response(p, rec):
     """Recorded speed after one interval's speed of one, in that interval and those that follow."""
     tau, h = max(p("tau").value, 0.0), rec.interval
-    if tau < SHORTEST:
-        return np.ones(1)
-    decay = np.exp(-h / tau)
-    lost = (tau / h) * (1.0 - decay)
-    follow = np.arange(min(int(np.log(FADED) / np.log(decay)) + 1, LONGEST) if decay > 0.0 else 1)
-    return np.concatenate([[1.0 - lost], lost * (1.0 - decay) * decay**follow])
+    impulse = np.zeros(min(int(-np.log(FADED) * tau / h) + 3, LONGEST))
+    impulse[0] = 1.0
+    return filtered(impulse, h, tau)
 
 
 def speed(p, rec, w):
