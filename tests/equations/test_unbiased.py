@@ -8,6 +8,7 @@ import pytest
 
 from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.described import Described, with_forms
+from emafault.diagnosis.linear import compressed_columns, correct, disturbance
 from emafault.diagnosis.whitening import whiten
 from emafault.equations import electrical
 from emafault.equations.point import Point, State
@@ -60,6 +61,27 @@ def test_noise_about_a_standstill_does_not_drive_what_is_behind_a_play():
     assert np.std(off) < 0.1 * NOISE.angle < 0.2 * np.std((noisy.turned - exact.turned)[within])
     moves = np.abs(noisy.speed) > 20.0
     assert moves.sum() > 1000 and np.array_equal(noisy.quiet()[moves], noisy.turned[moves])
+
+
+@pytest.mark.parametrize(("command", "interval", "seed"), [("sine", 1e-4, 17), ("parabolic", 5e-5, 18)])
+def test_the_angle_s_noise_counts_once_where_an_edge_lies(command, interval, seed):
+    """A share of an interval is a mean over that noise: taken out of the regressors as well, it left a matrix that the
+    gradient does not follow, and a fit that went to and fro."""
+    recording = recorded(command, seed=seed, interval=interval, theta_0=0.2 + 0.21 * seed)
+    machine = machine_of({"a.nc": recording})
+    at, edge = truth(machine, recording), "controller.edge_a@a.nc"
+
+    def gram(early):
+        block, other = (
+            next(b for b in machine.blocks(at | {edge: early}, "a.nc", drawn, {edge}) if b.equation == "commutation")
+            for drawn in (False, True)
+        )
+        white = compressed_columns(block, [edge], [block.columns[edge], block.residual], None)
+        correct(white, disturbance(block, other, [edge], None))
+        return white.gram
+
+    before, here, after = (gram(early) for early in (-1e-4, 0.0, 1e-4))
+    assert (after[0, 1] - before[0, 1]) / 2e-4 == pytest.approx(here[0, 0], rel=0.1)
 
 
 def test_a_large_wave_of_the_recorded_angle_is_undone_in_every_equation():

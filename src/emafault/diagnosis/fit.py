@@ -25,7 +25,7 @@ SINGLES = 3  # listed effects that a search may begin at in the place of what le
 CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
-FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter
+FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
 SETTLED = 0.5  # log evidence that one more step of a set may still promise
 
 
@@ -314,25 +314,25 @@ class Bench(NormalEquations):
 
         ``normal`` of a model fitted there saves the first step.
         """
-        ahead = np.inf  # log evidence that the last step promised
+        ahead = to_come = np.inf  # log evidence that the last step promised, and that the next one will
         if normal is not None:
             begun = dict(self.point), set(self.on)
-            ahead = self.move(model, normal)
+            ahead = to_come = self.move(model, normal)
             if ahead < self.settled:
                 return model
             new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun[1]}
             if new:
                 return self._settle_secants(model, new, begun)
-        for _ in range(steps):
-            if ahead < FAR:
-                break
-            # on its way a set may be led by a little bias, where it ends it must not
-            found, at_point = self._fitted(model, corrected=False)
-            ahead = self.move(found, at_point)
-        for _ in range(steps):
-            found, at_point = self._fitted(model)
-            if self.move(found, at_point) < self.settled:
-                break
+        # on its way a set may be led by a little bias, where it ends it must not
+        for enough, corrected in ((FAR, False), (self.settled, True)):
+            for _ in range(steps):
+                if to_come < enough:
+                    break
+                found, at_point = self._fitted(model, corrected)
+                before, ahead = ahead, self.move(found, at_point)
+                # steps shrink on at least as they did
+                to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
+            to_come = np.inf
         return found
 
     def _settle_secants(self, model: Model, new: set[str], begun: tuple[dict[str, float], set[str]]) -> Model:

@@ -166,7 +166,7 @@ def disturbance(
     changed = {n: c for n, c in changes.items() if np.any(c)}
     used = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
     residual = np.asarray(disturbed.residual - block.residual)
-    # a draw that is an outlier, as an edge moved into the next interval, would not have been used
+    # a draw that is an outlier would not have been used
     drawn = _white(block, residual)
     used = replace(used, usable=used.usable & (np.abs(drawn) < OUTLIER * np.sqrt(used.variance)))
     some = products(block.factor, block.usable, [*changed.values(), residual], used)

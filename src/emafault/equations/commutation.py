@@ -67,16 +67,19 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     """Intervals of phase j, their ends from the nominal edge, and where the current passes over (electrical rad)."""
     rec, p = state.rec, state.p
     rows = rows_of(state, j)
-    low, high = rec.once(("ends", j), lambda: tuple(x[rows] for x in sweep(rec, j)[:2]))
+    # a share is the mean over what the recorded angle leaves open, which no further draw of its noise changes
+    # (Berkson's error: Fuller 1987, Measurement Error Models, section 1.6.4)
+    angle = rec.drawn_from
+    low, high = angle.once(("ends", j), lambda: tuple(x[rows] for x in sweep(angle, j)[:2]))
     early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)
     stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])
     time = p("controller.commutation_time") + p("controller.commutation_slope") * stays
     time = time + p(f"controller.commutation_time_{'abc'[j]}")
-    w = rec.actuator.back_emf * np.abs(rec.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
+    w = rec.actuator.back_emf * np.abs(angle.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
     time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * stays) * w
-    edge = time * (rec.actuator.pole_pairs * rec.speed[rows]) - early
+    edge = time * (rec.actuator.pole_pairs * angle.speed[rows]) - early
     return rows, low, high, edge
 
 

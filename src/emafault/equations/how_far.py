@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
-from ..diagnosis.fit import NOTHING, Bench, Fit
+from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import read
 from ..diagnosis.point import is_parameter
@@ -19,12 +19,12 @@ from .point import SEEDED
 from .telling import Z
 
 
-def null(bench: Bench) -> Bench:
+def null(bench: Bench, fit: Fit) -> Bench:
     """The recalibrated nominal model: the nuisances alone, on the same recordings."""
     out = Bench(bench.machine, bench.recordings, bench.processes)
     out.carried, out.workers = bench.carried, bench.workers
-    out.point |= {n: bench.point[n] for n in bench.nuisances}
-    out.settle(NOTHING)
+    at = bench.inserted(fit.search.fit(()), fit.normal).values
+    out.point |= {n: at[n] for n in bench.nuisances}
     return out
 
 
@@ -49,7 +49,7 @@ def shrinks(
     models = _insertable(fit, leading, told)
     model = models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
-    nominal_unit = null(explored)
+    nominal_unit = null(explored, fit)
     recalibrated = {**off, **nominal_unit.values()}
     nominal = {n: recalibrated[n] if n.split("@")[0].removeprefix(SEEDED) in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)

@@ -86,6 +86,7 @@ class Signals:
         slow = uniform_filter1d(self.rate, odd(3e-3 / h), mode="nearest")
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
+        self.drawn_from = self
         self.level = 0.5 * np.abs(self.current).sum(axis=1)
         step = np.abs(np.diff(self.level, append=self.level[-1:]))
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
@@ -134,17 +135,22 @@ class Signals:
             return x + sigma * rng.standard_normal(x.shape)
 
         s = self.noise
-        return self._changed(
+        out = self._changed(
             voltage=more(self.voltage, s.voltage), current=more(self.current, s.current),
             current_end=None if self.current_end is None else more(self.current_end, s.current_end),
             speed_recorded=more(self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
             output=more(self.output, s.position), bus=None if self.bus is None else more(self.bus, s.bus_voltage),
         )  # fmt: skip
+        out.drawn_from = self
+        return out
 
     def less(self, channel: str, x: np.ndarray) -> "Signals":
         """A copy with (sample,) x taken off a channel: ``angle``, ``output``, or the current of a phase."""
         if channel == "angle":
-            return self._changed(angle=self.angle - x)
+            out = self._changed(angle=self.angle - x)
+            if self.drawn_from is not self:
+                out.drawn_from = self.drawn_from.less(channel, x)
+            return out
         if channel == "output":
             return self._changed(output=self.output - x)
         unit = np.eye(3)["abc".index(channel[-1])]

@@ -50,7 +50,7 @@ class Fitted:
     @cached_property
     def before(self) -> dict[str, float]:
         """All parameters of the recalibrated nominal model."""
-        return null(self.bench).values()
+        return null(self.bench, self.fit).values()
 
     @cached_property
     def values(self) -> dict[str, float]:
