@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
-from emafault.diagnosis.linear import White, assemble
+from emafault.diagnosis.linear import White, assemble, compressed_columns
+from emafault.diagnosis.model import Block
 
 ROWS, DRAWS, NOISE = 400, 300, 1.5
 
@@ -30,3 +32,16 @@ def test_the_estimate_has_no_bias():
     rng = np.random.default_rng(4)
     found = [-float(n.g[0] / n.H[0, 0]) for n in (corrected(rng, -0.5) for _ in range(DRAWS))]
     assert np.mean(found) == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_wider_noise_is_no_better_fit():
+    """The misfit is -2 log likelihood: rows whose noise a cause widens have a smaller square, and a smaller density."""
+    x = np.random.default_rng(5).standard_normal(ROWS)
+    usable = np.arange(ROWS) % 5 > 0
+    found = {}
+    for sd in (1.0, 2.0):
+        block = Block("one", "bus", x, {}, [np.full(ROWS, sd**2)], usable)
+        found[sd] = compressed_columns(block, [], [x], None).misfit
+    exact = {sd: -2.0 * norm.logpdf(x[usable], scale=sd).sum() for sd in found}
+    assert found[2.0] - found[1.0] == pytest.approx(exact[2.0] - exact[1.0])
+    assert found[1.0] < found[2.0]

@@ -1,5 +1,7 @@
 """At the simulated point the residual of every equation is the sensors' noise, whatever effect is on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -185,6 +187,25 @@ def test_derivatives_against_differences(effect):
             assert a @ b / (np.linalg.norm(a) * np.linalg.norm(b)) > 0.8, (equation, name)
             checked += 1
     assert checked > 0
+
+
+@pytest.mark.parametrize(("command", "ends"), [("reversal", True), ("sine", False)])
+def test_what_moves_a_residual_has_a_column(command, ends):
+    """Else a fit does not see what it loses there by moving it."""
+    recording = recorded(command, fault=FAULT, health="seeded")
+    if not ends:
+        recording = replace(recording, phase_current_end=None)
+    machine = machine_of({"a.nc": recording})
+    at = {n: v for n, v in truth(machine, recording, fault=FAULT).items() if n in machine.parameters}
+    base = {b.equation: b for b in machine.blocks(at, "a.nc")}
+    own = {p.name for u in machine.units if u.on is not None for v in (u.on, *u.variants) for p in v.parameters}
+    for name in set(at) - own:
+        step = 1e-2 * machine.parameters[name].sd
+        for block in machine.blocks(at | {name: at[name] + step}, "a.nc", wanted=()):
+            before = base[block.equation]
+            change = whiten(before.bands, before.usable, (block.residual - before.residual)[:, None] / 1e-2)
+            # of its prior's width; two standard deviations of the noise are not worth a column
+            assert name in before.columns or np.sum(change**2) < 4.0, (name, block.equation)
 
 
 def test_off_a_virtual_neutral_has_the_columns_that_it_has_next_to_off(nominal):

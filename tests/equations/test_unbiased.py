@@ -8,7 +8,7 @@ import pytest
 
 from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.described import Described, with_forms
-from emafault.diagnosis.linear import compressed_columns, correct, disturbance
+from emafault.diagnosis.linear import assemble, compressed_columns, correct, disturbance
 from emafault.diagnosis.whitening import whiten
 from emafault.equations import electrical
 from emafault.equations.point import Point, State
@@ -69,7 +69,7 @@ def test_the_angle_s_noise_counts_once_where_an_edge_lies(command, interval, see
     gradient does not follow, and a fit that went to and fro."""
     recording = recorded(command, seed=seed, interval=interval, theta_0=0.2 + 0.21 * seed)
     machine = machine_of({"a.nc": recording})
-    at, edge = truth(machine, recording), "controller.edge_a@a.nc"
+    at, edge = truth(machine, recording), "controller.passing@a.nc"
 
     def gram(early):
         block, other = (
@@ -80,8 +80,49 @@ def test_the_angle_s_noise_counts_once_where_an_edge_lies(command, interval, see
         correct(white, disturbance(block, other, [edge], None))
         return white.gram
 
-    before, here, after = (gram(early) for early in (-1e-4, 0.0, 1e-4))
-    assert (after[0, 1] - before[0, 1]) / 2e-4 == pytest.approx(here[0, 0], rel=0.1)
+    before, here, after = (gram(early) for early in (-1e-6, 0.0, 1e-6))
+    assert (after[0, 1] - before[0, 1]) / 2e-6 == pytest.approx(here[0, 0], rel=0.1)
+
+
+def test_commutations_tell_gains_offsets_and_displacements():
+    """At a constant speed all of them meet the ripple at one place: that is no displacement of the sensors."""
+    effects = {
+        "current_gain": {"g_a": 1.006, "g_b": 0.998, "g_c": 1.0},
+        "current_offset": {"o_a": 0.02, "o_b": 0.0, "o_c": 0.0},
+        "hall_displacement": {"d_a": 0.1, "d_b": 0.0, "d_c": 0.0},
+    }
+    moves = [("parabolic", {"acceleration": 0.3}), ("ramp", {"speed": 0.12}), ("ramp", {"speed": -0.2})]
+    recordings = {
+        f"{k}.nc": recorded(command, effects, seed=k, theta_0=0.2 + 0.3 * k, settings=settings)
+        for k, (command, settings) in enumerate(moves)
+    }
+    machine = machine_of(recordings)
+    at = {n: p.off for n, p in machine.parameters.items()}
+    for n, r in recordings.items():
+        known = truth(machine_of({"a.nc": r}), r, effects)
+        at |= {m.replace("a.nc", n): x for m, x in known.items()}
+    told = {n: at[n] for n in ("current_gain.g_a", "current_offset.o_a", "hall_displacement.d_a")}
+    names = [*told, *(n for n in machine.parameters if n.startswith(("controller.commutation", "controller.passing")))]
+    prior = {n: machine.parameters[n] for n in names}
+    values = at | {n: p.off for n, p in prior.items()}
+    for _ in range(4):
+        whites = []
+        for r in recordings:
+            blocks, others = (machine.blocks(values, r, drawn, names) for drawn in (False, True))
+            for block, other in zip(blocks, others, strict=True):
+                if block.equation == "commutation":
+                    inside = [n for n in names if n in block.columns]
+                    columns = [*(block.columns[n] for n in inside), block.residual]
+                    whites.append(compressed_columns(block, inside, columns, None))
+                    correct(whites[-1], disturbance(block, other, inside, None))
+        normal = assemble(whites, names, {})
+        precision = normal.H + np.diag([p.sd**-2.0 for p in prior.values()])
+        step = np.linalg.solve(precision, [(p.mean - values[n]) / p.sd**2 for n, p in prior.items()] - normal.g)
+        values |= {n: values[n] + d for n, d in zip(names, step, strict=True)}
+    sd = dict(zip(names, np.sqrt(np.diag(np.linalg.inv(precision))), strict=True))
+    for n, true in told.items():
+        assert abs(true - prior[n].off) > 8.0 * sd[n], n
+        assert values[n] == pytest.approx(true, abs=4.0 * sd[n]), n
 
 
 def test_a_large_wave_of_the_recorded_angle_is_undone_in_every_equation():

@@ -24,7 +24,8 @@ class White:
     """A block made white and compressed: its columns' ``names`` and normal matrix ``gram``, the residual last.
 
     ``own`` is what a second draw of the noise changes the residual by, squared: the noise's part of the misfit;
-    ``noise`` (column, column) what it changes the columns by, taken out of ``gram``; ``count`` the number of rows used.
+    ``noise`` (column, column) what it changes the columns by, taken out of ``gram``; ``count`` the number of rows used;
+    ``spread`` the log determinant of their noise's covariance, which a parameter may widen.
     """
 
     recording: str
@@ -34,6 +35,12 @@ class White:
     count: int
     own: float = 0.0
     noise: np.ndarray | None = None
+    spread: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """-2 log likelihood up to a constant of the rows, less the noise's part of it."""
+        return float(self.gram[-1, -1]) - self.own + self.spread
 
 
 def remainder_columns(block: Block, size: float) -> tuple[list[str], list[np.ndarray]]:
@@ -125,14 +132,22 @@ def compressed(block: Block, names: list[str], rows: np.ndarray, weights: Weight
     """Normal matrix of a block's white rows under its weights."""
     weighed = _weighed(rows, weights)
     used = block.usable if weights is None else weights.usable
-    return White(block.recording, block.equation, names, weighed.T @ weighed, int(used.sum()))
+    gram = weighed.T @ weighed
+    return White(block.recording, block.equation, names, gram, int(used.sum()), spread=_spread(block, used))
 
 
 def compressed_columns(block: Block, names: list[str], columns: Sequence, weights: Weights | None) -> White:
     """The same of raw columns, without all of their white rows in memory at once."""
     w = weights if weights is not None else Weights(block.usable, np.zeros(0), np.ones(len(block.usable)))
     gram = products(block.factor, block.usable, columns, w)
-    return White(block.recording, block.equation, names, gram, int(w.usable.sum()))
+    return White(
+        block.recording, block.equation, names, gram, int(w.usable.sum()), spread=_spread(block, w.usable)
+    )  # fmt: skip
+
+
+def _spread(block: Block, used: np.ndarray) -> float:
+    """Log determinant of the noise's covariance over the rows used."""
+    return 2.0 * float(np.sum(np.log(block.factor[0][used & block.usable])))
 
 
 def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:
@@ -225,7 +240,7 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         rows, into = np.array(source, int), np.array(target, int)
         _add(H, w.gram, rows, into)
         g[into] += w.gram[rows, -1]
-        c += w.gram[-1, -1] - w.own
+        c += w.misfit
         if w.noise is not None:
             _add(noise, w.noise, rows, into)
     return Normal(list(names), *_as_sure(H, g, noise), c)

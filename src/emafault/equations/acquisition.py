@@ -82,6 +82,15 @@ def bent(p: Point, channel: str, phase: str, x: Dual | np.ndarray, actuator: Act
     return out
 
 
+def gain(p: Point, j: int) -> Dual:
+    """True over recorded change of the current of phase j."""
+    out = Dual(1.0)
+    for m in with_hook("current"):
+        of = p.of(effect_name(m))
+        out = out * (m.current(of, j, Dual(1.0)) - m.current(of, j, Dual(0.0)))
+    return out
+
+
 def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
     and gain."""

@@ -2,7 +2,8 @@
 
 In an interval in which the edge at 30 (or 210) degrees of phase j lies, the mean current of phase j is that of the
 staying phase times the share of the interval beyond the edge. The time that a current takes to pass over is the
-controller's own: a constant and a part in proportion to the current.
+controller's own: a constant and a part in proportion to the current. At a constant speed all commutations meet the
+switching ripple at one and the same place, so that their time is off alike in a recording.
 """
 
 from itertools import pairwise
@@ -10,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import ndtr
 
+from .acquisition import gain
 from .dual import Dual, Number
 from .point import State, effect_name
 from .signals import UNRESOLVED, passing_time
@@ -49,18 +51,39 @@ def residual(state: State) -> Dual:
     """Mean current of the phase less its share (A), intervals of phase a, then b, then c."""
     out: list[Dual] = []
     for j in range(3):
-        rows, low, high, edge = _edges(state, j)
-        stays, own = (np.asarray(state.current[q].value)[rows] for q in (STAYS[j], j))
-        _, reach, width = _spread(state, j, low, high)
-        above, below = (high - edge.value) / reach, (low - edge.value) / reach
-        share = reach * (_above_zero(above) - _above_zero(below)) / width
-        out.append(own + edge.through(share, (ndtr(below) - ndtr(above)) / width) * stays)
+        rows, edge, share, slope = _shares(state, j)
+        stays, own = (_at(rows, state.current[q], state.rec.size) for q in (STAYS[j], j))
+        # the measured quantity keeps its coefficient: a gain of all currents alike would shrink its noise
+        out.append((own + edge.through(share, slope) * stays) * (1.0 / gain(state.p, j)))
     ends = np.cumsum([0, *(len(np.atleast_1d(d.value)) for d in out)]).tolist()
     slopes = {n: np.zeros(ends[-1]) for d in out for n in d.slopes}
     for d, (first, end) in zip(out, pairwise(ends), strict=True):
-        for n, slope in d.slopes.items():
-            slopes[n][first:end] = slope
+        for n, s in d.slopes.items():
+            slopes[n][first:end] = s
     return Dual(np.concatenate([np.atleast_1d(d.value) for d in out]), dict[str, Number](slopes))
+
+
+def _at(rows: np.ndarray, x: Dual, size: int) -> Dual:
+    return x.linear(lambda values: values[rows], size)
+
+
+def by_angle(state: State) -> np.ndarray:
+    """(row,) how the residual changes with the electrical angle at which the edges lie (A/rad)."""
+    out = []
+    for j in range(3):
+        rows, _, _, slope = _shares(state, j)
+        out.append(slope * np.asarray(state.current[STAYS[j]].value)[rows])
+    return np.concatenate(out)
+
+
+def _shares(state: State, j: int) -> tuple[np.ndarray, Dual, np.ndarray, np.ndarray]:
+    """Intervals of phase j, where the current passes over (electrical rad), (row,) the share of an interval beyond
+    that, and how it changes with that."""
+    rows, low, high, edge = _edges(state, j)
+    _, reach, width = _spread(state, j, low, high)
+    above, below = (high - edge.value) / reach, (low - edge.value) / reach
+    share = reach * (_above_zero(above) - _above_zero(below)) / width
+    return rows, edge, share, (ndtr(below) - ndtr(above)) / width
 
 
 def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Dual]:
@@ -71,12 +94,12 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     # (Berkson's error: Fuller 1987, Measurement Error Models, section 1.6.4)
     angle = rec.drawn_from
     low, high = angle.once(("ends", j), lambda: tuple(x[rows] for x in sweep(angle, j)[:2]))
-    early: Dual | float = p(f"controller.edge_{'abc'[j]}@{rec.name}")
+    early: Dual | float = Dual(0.0)
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)
     stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])
     time = p("controller.commutation_time") + p("controller.commutation_slope") * stays
-    time = time + p(f"controller.commutation_time_{'abc'[j]}")
+    time = time + p(f"controller.commutation_time_{'abc'[j]}") + p(f"controller.passing@{rec.name}")
     w = rec.actuator.back_emf * np.abs(angle.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
     time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * stays) * w
     edge = time * (rec.actuator.pole_pairs * angle.speed[rows]) - early

@@ -34,16 +34,17 @@ def residual(state: State) -> Dual:
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
     shaft = position.shaft_angle(state)
     output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
-    model = np.asarray(value_of(seen_speed(state, Dual(rec.speed))))
-    beyond = _averaged(rec.speed_recorded - model, h)
+    model = seen_speed(state, Dual(rec.speed))
+    beyond = (rec.speed_recorded - model).linear(lambda x: _averaged(x, h), rec.size)
     # rounding is the recording's alone, and no more than a step
-    seen = model + np.sign(beyond) * np.maximum(np.abs(beyond) - rec.speed_step, 0.0)
+    more = np.maximum(np.abs(beyond.value) - rec.speed_step, 0.0)
+    seen = model + Dual(np.sign(beyond.value) * more, beyond.kept(more > 0.0).slopes)
     commanded = rec.once(("commanded",), lambda: _commanded(rec, lead))
     at_ticks = output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
     wanted = p("controller.position_gain") * (a.gear_ratio * (commanded - at_ticks))
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
-    error = asked - _centred(seen, h, lead)
+    error = asked - seen.linear(lambda x: _centred(x, h, lead), rec.size)
     # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them. It holds the
     # present sample too, which makes up for the time that a demand is in force
     integral = error.linear(lambda x: np.cumsum(x) * h + (lead - 0.5 * h) * x, rec.size)
@@ -54,7 +55,8 @@ def residual(state: State) -> Dual:
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    flowing = _calmed((_true_level(state) - _beyond(state)) * sign + _sensors_show(state), h) / gain
+    flowing = (_true_level(state) - _beyond(state)) * sign + _sensors_show(state)
+    flowing = flowing.linear(lambda x: _calmed(x, h), rec.size) / gain
     # the current changes as the demand does, and is known with less noise
     asked_for = asked_for - late * np.gradient(np.asarray(value_of(flowing)), h)
     width = block_length(rec)
@@ -70,18 +72,21 @@ def _averaged(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(AVERAGED / h), mode="nearest")
 
 
-def _true_level(state: State) -> np.ndarray:
+def _true_level(state: State) -> Dual:
     """(sample,) half the sum of the absolute phase currents (A)."""
-    return 0.5 * np.sum([np.abs(np.asarray(value_of(i))) for i in state.current], axis=0)
+    out = Dual(0.0)
+    for i in state.current:
+        out = out + i * (0.5 * np.sign(i.value))
+    return out
 
 
-def _sensors_show(state: State) -> np.ndarray:
+def _sensors_show(state: State) -> Dual:
     """(sample,) what the regulator sees of the pair's current beyond the true one (A): the mean of what the sensors of
     the two phases that are switched on show, each in the direction in which the pair's current is counted."""
     rec = state.rec
-    out = np.zeros(rec.size)
+    out = Dual(0.0)
     for j, on in enumerate(rec.once(("counted",), lambda: [_counted(rec, phase) for phase in range(3)])):
-        out += 0.5 * on * (rec.current[:, j] - np.asarray(value_of(state.current[j])))
+        out = out + (rec.current[:, j] - state.current[j]) * (0.5 * on)
     return out
 
 

@@ -46,7 +46,6 @@ def voltages(state: State) -> list[Dual]:
         if rec.current_end is None:
             across = _runs(state, j).across
             rise = Dual(rise.value, {n: np.where(across, s, 0.0) for n, s in rise.slopes.items()})
-            rise = rise + state.p(f"ends.{'abc'[j]}@{rec.name}") * np.where(across, 0.0, _by_curvature(state, j))
         state.rise.append(rise)
         back_emf = np.asarray(value_of(state.k[j] * state.swept[j]))
         by_calm = state.k[j] * state.regressor[j]
@@ -58,19 +57,6 @@ def _difference(x: np.ndarray) -> np.ndarray:
     out = np.array(x, float)
     out[1:] -= x[:-1]
     return out
-
-
-def _by_curvature(state: State, j: int) -> np.ndarray:
-    """Voltage (V) of the inductance that the mean of two neighbouring means of the current lacks for its curvature.
-
-    A cubic through four means has an end a twelfth of both second differences below their mean. Where a current sets
-    in, fades or is chopped within an interval it is off by another amount, but in the same way each time.
-    """
-    rec = state.rec
-    i = rec.current[:, j]
-    bend = np.diff(i, 2, prepend=i[:1], append=i[-1:])
-    below = -(bend + np.append(bend[1:], 0.0)) / 12.0
-    return _difference(below) * (rec.actuator.inductance / rec.interval)
 
 
 def residuals(state: State) -> dict[str, Dual]:

@@ -238,7 +238,7 @@ def _misfit(ladder: Ladder, bench: Bench, fit: Fit, model: Model) -> float:
     whites = ladder.blocks(
         inserted.values, remainders=bool(shared or own), also=also, inserted=inserted, corrected=True
     )
-    found = _occam(ladder, whites, model, fit) + sum(float(w.gram[-1, -1]) - w.own for w in whites)
+    found = _occam(ladder, whites, model, fit) + sum(w.misfit for w in whites)
     if not shared and not own:
         return found
     seen = dict.fromkeys(n for w in whites for n in w.names if n.startswith("remainder."))

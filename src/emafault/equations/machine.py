@@ -12,7 +12,7 @@ from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .coordinates import ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
-from .parameters import PER_PHASE, internal, measuring_chain, nuisances, unit_of
+from .parameters import internal, measuring_chain, nuisances, unit_of
 from .point import Point, State
 from .signals import Signals
 
@@ -166,12 +166,9 @@ class ReferenceActuator:
     ) -> np.ndarray:
         """(column, row) what signals x (column, sample) on the angle's channel take out of the commutations' residuals;
         it depends on the point, on where within an interval an edge lies. ``less`` as in ``blocks``."""
-        edges = [f"controller.edge_{j}@{name}" for j in PER_PHASE]
-        state = State(_less(self.recordings[name], less), Point(values, name, edges))
-        slopes = commutation.residual(state).slopes
+        state = State(_less(self.recordings[name], less), Point(values, name, ()))
         rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
-        moved = sum((np.asarray(slopes[e]) for e in edges if e in slopes), np.zeros(len(rows)))
-        return -self.actuator.pole_pairs * x[:, rows] * moved
+        return self.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
 
     def _back_emf(self, state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
         """The same of a relative change of phase j's back-EMF coefficient: in its voltage and in the torque."""

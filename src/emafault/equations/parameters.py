@@ -16,10 +16,8 @@ from .terms import TERMS
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
 SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
-EDGE_SCATTER = 1e-3  # electrical rad, by which the model of how current passes over may be wrong in a recording
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
-CURVATURE = 10.0  # times a smooth current's, by which a current at an interval's end is off its neighbours' mean
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
@@ -58,6 +56,7 @@ def nuisances(
         full = f"controller.commutation_{name}"
         out[full] = Parameter(full, 0.0, 0.0, sd, units)
     unknown = False
+    ripple = a.inductance / a.bus_voltage * a.hysteresis  # s, in which a current crosses the regulator's band
     for name, rec in recordings.items():
         out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
         for channel in ("voltage", "current"):
@@ -70,11 +69,8 @@ def nuisances(
             for j in PER_PHASE:
                 full = f"rounded.{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
-        for j in PER_PHASE if rec.current_end is None else ():
-            out[f"ends.{j}@{name}"] = Parameter(f"ends.{j}@{name}", 0.0, 0.0, CURVATURE, "1")
-        for j in PER_PHASE:
-            full = f"controller.edge_{j}@{name}"
-            out[full] = Parameter(full, 0.0, 0.0, EDGE_SCATTER, "rad")
+        full = f"controller.passing@{name}"
+        out[full] = Parameter(full, 0.0, 0.0, ripple, "s")
         if rec.health == "seeded":
             for f in FAULTS:  # how large a bench seeds them is not known beforehand
                 common = _fault(SEEDED + f, f)
