@@ -2,8 +2,8 @@
 
 In an interval in which the edge at 30 (or 210) degrees of phase j lies, the mean current of phase j is that of the
 staying phase times the share of the interval beyond the edge. The time that a current takes to pass over is the
-controller's own: a constant and a part in proportion to the current. At a constant speed all commutations meet the
-switching ripple at one and the same place, so that their time is off alike in a recording.
+controller's own: a constant and a part in proportion to the current. At a constant speed all commutations of a phase
+meet the switching ripple at one and the same place, so that in a recording their time is off alike in each direction.
 """
 
 from itertools import pairwise
@@ -11,17 +11,19 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import ndtr
 
+from ..actuator.parameters import ActuatorParameters
 from .acquisition import gain
 from .dual import Dual, Number
 from .point import State, effect_name
-from .signals import UNRESOLVED, passing_time
+from .signals import passing_time
 from .terms import with_hook
 
 EDGE = np.pi / 6.0
 REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors may move it by
-PASSING = 0.3  # of the time in which a current passes over, by which it scatters on effect-free benches
 LONGEST = 0.35  # of an interval, that a current may take to pass over
 WIDEST = 0.25  # variance that a share of an interval has at most
+SHIFTS = ("skew.current@", "lag.current_")  # parameters
+WAYS = {"ahead": 1.0, "back": -1.0}
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 
@@ -52,9 +54,9 @@ def residual(state: State) -> Dual:
     out: list[Dual] = []
     for j in range(3):
         rows, edge, share, slope = _shares(state, j)
-        stays, own = (_at(rows, state.current[q], state.rec.size) for q in (STAYS[j], j))
+        stays, own = (_shifted(state.current[q], rows) for q in (STAYS[j], j))
         # the measured quantity keeps its coefficient: a gain of all currents alike would shrink its noise
-        out.append((own + edge.through(share, slope) * stays) * (1.0 / gain(state.p, j)))
+        out.append((own + edge.through(share, slope) * stays) * float(1.0 / gain(state.p, j).value))
     ends = np.cumsum([0, *(len(np.atleast_1d(d.value)) for d in out)]).tolist()
     slopes = {n: np.zeros(ends[-1]) for d in out for n in d.slopes}
     for d, (first, end) in zip(out, pairwise(ends), strict=True):
@@ -63,8 +65,10 @@ def residual(state: State) -> Dual:
     return Dual(np.concatenate([np.atleast_1d(d.value) for d in out]), dict[str, Number](slopes))
 
 
-def _at(rows: np.ndarray, x: Dual, size: int) -> Dual:
-    return x.linear(lambda values: values[rows], size)
+def _shifted(x: Dual, rows: np.ndarray) -> Dual:
+    """Some samples of a current, with derivatives by what shifts it in time; what multiplies it would its noise too."""
+    slopes = {n: np.asarray(s)[rows] for n, s in x.slopes.items() if n.startswith(SHIFTS)}
+    return Dual(np.asarray(x.value)[rows], dict[str, Number](slopes))
 
 
 def by_angle(state: State) -> np.ndarray:
@@ -80,7 +84,7 @@ def _shares(state: State, j: int) -> tuple[np.ndarray, Dual, np.ndarray, np.ndar
     """Intervals of phase j, where the current passes over (electrical rad), (row,) the share of an interval beyond
     that, and how it changes with that."""
     rows, low, high, edge = _edges(state, j)
-    _, reach, width = _spread(state, j, low, high)
+    reach, width = _spread(state, j, low, high)
     above, below = (high - edge.value) / reach, (low - edge.value) / reach
     share = reach * (_above_zero(above) - _above_zero(below)) / width
     return rows, edge, share, (ndtr(below) - ndtr(above)) / width
@@ -99,26 +103,32 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
         early = early + m.commutation(p.of(effect_name(m)), j)
     stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])
     time = p("controller.commutation_time") + p("controller.commutation_slope") * stays
-    time = time + p(f"controller.commutation_time_{'abc'[j]}") + p(f"controller.passing@{rec.name}")
+    time = time + p(f"controller.commutation_time_{'abc'[j]}")
+    for way, sign in WAYS.items():
+        there = (np.sign(angle.speed[rows]) == sign).astype(float)
+        time = time + p(f"controller.passing_{'abc'[j]}_{way}@{rec.name}") * there
     w = rec.actuator.back_emf * np.abs(angle.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
     time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * stays) * w
     edge = time * (rec.actuator.pole_pairs * angle.speed[rows]) - early
     return rows, low, high, edge
 
 
-def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(row,) by how long a passing over scatters (s), how far an edge and its interval's ends are uncertain and the
-    interval's width (electrical rad)."""
+def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(row,) how far an edge and its interval's ends are uncertain and the interval's width (electrical rad)."""
     rec, rows = state.rec, rows_of(state, j)
     return rec.once(("spread", j), lambda: _new_spread(rec, rows, j, high - low))
 
 
-def _new_spread(rec, rows: np.ndarray, j: int, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    a = rec.actuator
-    scatter = a.inductance / a.bus_voltage * (a.hysteresis + PASSING * np.abs(rec.current[rows, STAYS[j]]))
-    ends = a.pole_pairs * rec.noise.angle
-    reach = np.hypot(a.pole_pairs * np.abs(rec.speed[rows]) * scatter, ends)
-    return scatter, reach, np.maximum(width, ends)
+def _new_spread(rec, rows: np.ndarray, j: int, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    poles = rec.actuator.pole_pairs
+    ends = poles * rec.noise.angle
+    return np.hypot(poles * np.abs(rec.speed[rows]) * ripple_time(rec.actuator), ends), np.maximum(width, ends)
+
+
+def ripple_time(actuator: ActuatorParameters) -> float:
+    """Standard deviation (s) of the time in which a current i passes over, 3 L i / V: it is anywhere in the regulator's
+    band when it begins to."""
+    return 3.0 * actuator.inductance * actuator.hysteresis / (np.sqrt(12.0) * actuator.bus_voltage)
 
 
 def _above_zero(z: np.ndarray) -> np.ndarray:
@@ -127,19 +137,24 @@ def _above_zero(z: np.ndarray) -> np.ndarray:
 
 
 def noise_bands(state: State) -> list[np.ndarray]:
-    """Diagonal of the noise's covariance (A2): the sensors', when within the ripple a current passes over and by what
-    the ends of its interval are off, and where a current that changes does so within an interval."""
+    """Diagonal of the noise's covariance (A2): the sensors' of true currents, which add up to nothing, when within the
+    ripple a current passes over and by what the ends of its interval are off, and where the current that passes over
+    changes within the interval."""
     rec, a = state.rec, state.rec.actuator
     change = rec.rows_from.current_change
     out = []
     for j in range(3):
         rows, low, high, edge = _edges(state, j)
         stays = np.abs(rec.current[rows, STAYS[j]])
-        scatter, reach, width = _spread(state, j, low, high)
+        reach, width = _spread(state, j, low, high)
         inside = ndtr((high - edge.value) / reach) - ndtr((low - edge.value) / reach)
         share = np.clip((high - edge.value) / width, 0.0, 1.0)
         ends = a.pole_pairs * rec.noise.angle / width
-        off = (scatter / rec.interval) ** 2 + (share**2 + (1.0 - share) ** 2) * ends**2
+        off = (ripple_time(a) / rec.interval) ** 2 + (share**2 + (1.0 - share) ** 2) * ends**2
         passing = inside * np.minimum(off, WIDEST) * stays**2
-        out.append(2.0 * rec.noise.current**2 + passing + (UNRESOLVED * change[rows]) ** 2)
+        # of two of three currents that have their mean taken off, the second times the share
+        sensors = 2.0 / 3.0 * (1.0 - share + share**2) * rec.noise.current**2
+        # of a current that changes evenly in the interval, the share has another mean than the whole
+        bent = 0.5 * share * (1.0 - share) * change[rows]
+        out.append(sensors + passing + bent**2)
     return [np.concatenate(out)]

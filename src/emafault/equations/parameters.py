@@ -9,6 +9,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
+from .commutation import WAYS, ripple_time
 from .point import SEEDED
 from .signals import REST, Signals
 from .terms import TERMS
@@ -56,7 +57,6 @@ def nuisances(
         full = f"controller.commutation_{name}"
         out[full] = Parameter(full, 0.0, 0.0, sd, units)
     unknown = False
-    ripple = a.inductance / a.bus_voltage * a.hysteresis  # s, in which a current crosses the regulator's band
     for name, rec in recordings.items():
         out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
         for channel in ("voltage", "current"):
@@ -69,8 +69,8 @@ def nuisances(
             for j in PER_PHASE:
                 full = f"rounded.{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
-        full = f"controller.passing@{name}"
-        out[full] = Parameter(full, 0.0, 0.0, ripple, "s")
+        for full in (f"controller.passing_{j}_{way}@{name}" for j in PER_PHASE for way in WAYS):
+            out[full] = Parameter(full, 0.0, 0.0, ripple_time(a), "s")
         if rec.health == "seeded":
             for f in FAULTS:  # how large a bench seeds them is not known beforehand
                 common = _fault(SEEDED + f, f)
