@@ -69,7 +69,7 @@ def test_the_angle_s_noise_counts_once_where_an_edge_lies(command, interval, see
     gradient does not follow, and a fit that went to and fro."""
     recording = recorded(command, seed=seed, interval=interval, theta_0=0.2 + 0.21 * seed)
     machine = machine_of({"a.nc": recording})
-    at, edge = truth(machine, recording), "controller.passing_a_ahead@a.nc"
+    at, edge = truth(machine, recording), "controller.passing_a_ahead_out@a.nc"
 
     def gram(early):
         block, other = (

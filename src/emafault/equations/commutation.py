@@ -2,8 +2,8 @@
 
 In an interval in which the edge at 30 (or 210) degrees of phase j lies, the mean current of phase j is that of the
 staying phase times the share of the interval beyond the edge. The time that a current takes to pass over is the
-controller's own: a constant and a part in proportion to the current. At a constant speed all commutations of a phase
-meet the switching ripple at one and the same place, so that in a recording their time is off alike in each direction.
+controller's own: a constant and a part in proportion to the current. At a constant speed all commutations at an edge
+meet the switching ripple at one and the same place, so that in a recording their time is off alike.
 """
 
 from itertools import pairwise
@@ -23,7 +23,6 @@ REACH = np.deg2rad(6.0)  # electrical rad around an edge that displaced sensors 
 LONGEST = 0.35  # of an interval, that a current may take to pass over
 WIDEST = 0.25  # variance that a share of an interval has at most
 SHIFTS = ("skew.current@", "lag.current_")  # parameters
-WAYS = {"ahead": 1.0, "back": -1.0}
 STAYS = (1, 2, 0)  # phase that stays on where a, b, c are switched on
 
 
@@ -104,17 +103,31 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])
     time = p("controller.commutation_time") + p("controller.commutation_slope") * stays
     time = time + p(f"controller.commutation_time_{'abc'[j]}")
-    for way, sign in WAYS.items():
-        there = (np.sign(angle.speed[rows]) == sign).astype(float)
-        time = time + p(f"controller.passing_{'abc'[j]}_{way}@{rec.name}") * there
+    for name, there in rec.rows_from.once(("edges_of", j), lambda: _edges_of(rec.rows_from, rows, j)).items():
+        time = time + p(name) * there
     w = rec.actuator.back_emf * np.abs(angle.speed[rows]) / (0.5 * rec.actuator.bus_voltage)
     time = time + (p("controller.commutation_speed") + p("controller.commutation_power") * stays) * w
     edge = time * (rec.actuator.pole_pairs * angle.speed[rows]) - early
     return rows, low, high, edge
 
 
+def passing(j: int, recording: str) -> list[str]:
+    """Names of the times by which passings over at the edges of phase j are off: ahead and back, where the phase that
+    stays on carries its current out of the motor and into it. The ripple may meet each at another place."""
+    ways = [f"{way}_{side}" for way in ("ahead", "back") for side in ("out", "in")]
+    return [f"controller.passing_{'abc'[j]}_{way}@{recording}" for way in ways]
+
+
+def _edges_of(rec, rows: np.ndarray, j: int) -> dict[str, np.ndarray]:
+    """Which intervals have which of them, (row,) of 0 and 1 by name."""
+    ahead, out = rec.speed[rows] > 0.0, rec.current[rows, STAYS[j]] < 0.0
+    kinds = ahead & out, ahead & ~out, ~ahead & out, ~ahead & ~out
+    return {n: k.astype(float) for n, k in zip(passing(j, rec.name), kinds, strict=True)}
+
+
 def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(row,) how far an edge and its interval's ends are uncertain and the interval's width (electrical rad)."""
+    """(row,) over how far the current passes over, by the ripple, by its own rise and by what the recorded angle leaves
+    open, and the interval's width (electrical rad)."""
     rec, rows = state.rec, rows_of(state, j)
     return rec.once(("spread", j), lambda: _new_spread(rec, rows, j, high - low))
 
@@ -122,7 +135,9 @@ def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np
 def _new_spread(rec, rows: np.ndarray, j: int, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     poles = rec.actuator.pole_pairs
     ends = poles * rec.noise.angle
-    return np.hypot(poles * np.abs(rec.speed[rows]) * ripple_time(rec.actuator), ends), np.maximum(width, ends)
+    ramp = passing_time(rec.actuator, np.abs(rec.current[rows, STAYS[j]])) / np.sqrt(12.0)
+    time = np.hypot(ripple_time(rec.actuator), ramp)
+    return np.hypot(poles * np.abs(rec.speed[rows]) * time, ends), np.maximum(width, ends)
 
 
 def ripple_time(actuator: ActuatorParameters) -> float:

@@ -9,7 +9,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
-from .commutation import WAYS, ripple_time
+from . import commutation
 from .point import SEEDED
 from .signals import REST, Signals
 from .terms import TERMS
@@ -69,8 +69,8 @@ def nuisances(
             for j in PER_PHASE:
                 full = f"rounded.{j}@{name}"
                 out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
-        for full in (f"controller.passing_{j}_{way}@{name}" for j in PER_PHASE for way in WAYS):
-            out[full] = Parameter(full, 0.0, 0.0, ripple_time(a), "s")
+        for full in (n for j in range(3) for n in commutation.passing(j, name)):
+            out[full] = Parameter(full, 0.0, 0.0, commutation.ripple_time(a), "s")
         if rec.health == "seeded":
             for f in FAULTS:  # how large a bench seeds them is not known beforehand
                 common = _fault(SEEDED + f, f)
