@@ -82,7 +82,7 @@ def test_the_verdict_and_the_fault_are_what_was_simulated(folder, blocks):
 def test_files_that_the_page_names_are_there(folder, blocks):
     for name in ("demo/report.html", "demo/experiment.yaml", "bench/import.html", "verdict/report.html"):
         assert (folder / name).stat().st_size > 0, name
-    assert (folder / "motions" / "1_reversal.csv").read_text().startswith("time_s,position_rad")
+    assert (folder / "motions" / "1_chirp.csv").read_text().startswith("time_s,position_rad")
 
 
 @pytest.mark.parametrize(
