@@ -16,6 +16,7 @@ from .terms import TERMS
 
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
+EDGE = 2e-4  # electrical rad, by which the model of how a current passes over is off in all recordings of sixty
 SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
@@ -56,6 +57,9 @@ def nuisances(
     ):
         full = f"controller.commutation_{name}"
         out[full] = Parameter(full, 0.0, 0.0, sd, units)
+    for j in PER_PHASE:
+        full = f"controller.edge_{j}"
+        out[full] = Parameter(full, 0.0, 0.0, EDGE, "rad")
     unknown = False
     for name, rec in recordings.items():
         out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
