@@ -16,7 +16,7 @@ from .terms import TERMS
 
 FAULTS = ("Na", "Nb", "Nc", "xi_x", "xi_y")
 HEALTHY = 1e-3
-EDGE = 2e-4  # electrical rad, by which the model of how a current passes over is off in all recordings of sixty
+EDGE = 2e-4  # electrical rad, systematic error of the modelled angle of commutation, seen with sixty recordings
 SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings have alike (a hierarchical prior)
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
