@@ -34,6 +34,8 @@ class Machine:
     def families(self, equation):
         return ()
 
+    own_families = families
+
     def blocks(self, values, recording, wanted=None, disturbed=False):
         residual = np.zeros(ROWS) if disturbed else np.random.default_rng(0).standard_normal(ROWS)
         columns = {"viscous.scale": SPEED, "load.T": np.ones(ROWS), "form.c": self.form}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from emafault.diagnosis.linear import White, assemble, compressed_columns
+from emafault.diagnosis.linear import White, assemble, compressed_columns, own_columns
 from emafault.diagnosis.model import Block
 
 ROWS, DRAWS, NOISE = 400, 300, 1.5
@@ -45,3 +45,16 @@ def test_a_wider_noise_is_no_better_fit():
     exact = {sd: -2.0 * norm.logpdf(x[usable], scale=sd).sum() for sd in found}
     assert found[2.0] - found[1.0] == pytest.approx(exact[2.0] - exact[1.0])
     assert found[1.0] < found[2.0]
+
+
+def test_a_form_is_seen_where_noise_averages_out():
+    """The noise of a differenced signal is anti-correlated: a slow effect that no row shows is clear in all of them."""
+    slow = np.full(ROWS, 0.1)
+    along = {"own": [np.ones(ROWS), np.linspace(-1.0, 1.0, ROWS)]}
+    usable = np.ones(ROWS, bool)
+    seen = {}
+    for name, bands in {"white": [np.ones(ROWS)], "differenced": [np.ones(ROWS), np.full(ROWS - 1, -0.499)]}.items():
+        block = Block("one", "torque", np.zeros(ROWS), {"load.T": slow}, bands, usable, along)
+        seen[name] = own_columns(block, "load", {"load.T": 0.9})[0]
+    assert seen["white"] == []
+    assert seen["differenced"] == ["own.load.torque.0", "own.load.torque.1"]

@@ -66,13 +66,12 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
 
 
 def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
-    """Log posterior odds that what a unit of a set takes up goes along it with any coefficients, against the unit.
+    """Log posterior odds that a unit of a set differs from the library's along what its rows lie along by as much as it
+    is large, or more, against its own form or one near it: what is left over of another cause does.
 
-    The unit's columns times functions of what their rows lie along have coefficients of zero mean and any size there,
-    in the place of the unit in its own form or one near it: what is left over of another cause has them. Without such a
-    function they are the unit itself.
+    The unit itself, and how much of it each equation has, are of the same prior in both.
 
-    Minus infinity for a unit that carries no form of its own.
+    Minus infinity for a unit that carries no form of its own, or none along anything.
     """
     choice = next(c for c in model.choices if c.unit == unit)
     plain = fit.search.candidates[unit, choice.variant % OTHER_FORM]
@@ -80,20 +79,19 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
         fit.search.candidates[unit, v] for u, v in fit.search.candidates
         if u == unit and v >= OTHER_FORM and v % OTHER_FORM == choice.variant % OTHER_FORM
     ]  # fmt: skip
-    if not forms:
-        return -np.inf
     prior = prior_of(fit, model)
-    rest = {n: q for n, q in prior.items() if n not in plain.names and not n.startswith(f"own.{unit}.")}
     names: Sequence[str] = fit.search.reduced.names
     evidence = partial(_evidence, fit.search.reduced)
-    whole = rest | {n: prior[n] for n in plain.names}
-    near = [
-        evidence(whole | {names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)}) for f in forms
-    ]
-    of = logsumexp([evidence(whole) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)])
-    kinds = dict.fromkeys(tuple(f.extra.tolist()) for f in forms if not all(names[k].endswith(".0") for k in f.extra))
-    any_of = [evidence(rest | {names[k]: (0.0, s) for k in kind}) for kind in kinds for s in SHARES]
-    return float(log_mean(any_of) - of + PRIOR)
+    itself = {n: q for n, q in prior.items() if not n.startswith(f"own.{unit}.")} | {n: prior[n] for n in plain.names}
+    own = [{names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)} for f in forms]
+    near = [evidence(itself | form) for form in own]
+    widest = {tuple(form): form for form in sorted(own, key=lambda form: max(form.values()))}
+    along = [(form, [n for n in form if not n.endswith(".0")]) for form in widest.values()]
+    far = [evidence(itself | form | {n: (0.0, s) for n in free}) for form, free in along if free for s in SHARES]
+    if not far:
+        return -np.inf
+    of = [evidence(itself) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)]
+    return float(log_mean(far) - logsumexp(of) + PRIOR)
 
 
 def _evidence(reduced: Reduced, free: Mapping[str, tuple[float, float]]) -> float:

@@ -10,10 +10,9 @@ from .evidence import Definite, Normal, factored
 from .model import Block
 from .whitening import OUTLIER, Weights, coloured, filtered, products, substituted
 
-OWN = slice(0, 14)  # functions of an own form; the first is constant, for it may differ between equations
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 OWN_SHARES = (1.0, 0.2)  # of that: as far from the library's as a form is, or near it
-SEEN = 4.0  # squared size over the noise, from which an effect's form in a block matters
+SEEN = 4.0  # squared size of its white rows, from which an effect's form in a block matters
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 FEW = 30  # rows
 ROUNDING = 1e-10  # of a unit diagonal
@@ -72,13 +71,13 @@ def _noise_of(block: Block) -> float:
 
 
 def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
-    """What a unit of these amounts adds to a block, times functions of the coordinates: its form where that is not the
-    library's."""
+    """What a unit of these amounts adds to a block, times functions of the coordinates, the first of them constant: its
+    form where that is not the library's."""
     added = _added(block, amounts)
-    if np.sum(added[block.usable] ** 2 / block.bands[0][block.usable]) < SEEN:
+    if np.sum(_white(block, added) ** 2) < SEEN:
         return [], []
-    phi = block.coordinates["phi"][OWN]
-    return [f"own.{unit}.{block.equation}.{f}" for f in range(len(phi))], [added * f for f in phi]
+    functions = block.coordinates["own"]
+    return [f"own.{unit}.{block.equation}.{f}" for f in range(len(functions))], [added * f for f in functions]
 
 
 def _added(block: Block, amounts: Mapping[str, float]) -> np.ndarray:
@@ -171,7 +170,7 @@ def disturbance(
     wanted = set(names)
     for unit, amounts in (own or {}).items():  # an own form has the noise of what it is a form of
         more = _added(disturbed, amounts) - _added(block, amounts)
-        for f, function in enumerate(block.coordinates["phi"][OWN]):
+        for f, function in enumerate(block.coordinates["own"]):
             name = f"own.{unit}.{block.equation}.{f}"
             if name in wanted:
                 changes[name] = more * function

@@ -238,7 +238,7 @@ class NormalEquations(Point):
             return []
         every = [own]
         where = {k: reduced.names[k].split(".")[2:] for k in own.tolist()}
-        of = {e: self.machine.families(e) for e in dict.fromkeys(e for e, _ in where.values())}
+        of = {e: self.machine.own_families(e) for e in dict.fromkeys(e for e, _ in where.values())}
         if all(of.values()):
             every.append(np.array([k for k, (_, f) in where.items() if f == "0"], int))  # by equation
             for n in range(min(map(len, of.values()))):

@@ -1,6 +1,6 @@
 """What the rows of an equation lie along, and the drivers that a coefficient in it multiplies."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,10 @@ SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperatu
 EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
 #: functions of a remainder along one coordinate: speed, current, time and temperature, angle
 ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
+SMOOTH = 3  # functions of the speed that an own form has
+#: functions of an own form along one coordinate: speed, current, time, angle
+OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6), (0, 7, 8, 9, 10, 11, 12, 13, 14))
+SLOW = 8.0  # rad/s, below which friction is another
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
 SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
@@ -37,9 +41,19 @@ def functions_of(rec: Signals) -> dict[str, Any]:
         np.cos(x), np.sin(x), np.cos(2 * x), np.sin(2 * x),
         np.cos(3 * x), np.sin(3 * x), np.cos(rec.middle), np.sin(rec.middle),
         np.full(rec.size, rec.dT_measured / 50.0),
-        np.exp(-np.abs(rec.speed) / 8.0), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
+        np.exp(-np.abs(rec.speed) / SLOW), np.cos(4 * np.pi * t), np.sin(2 * np.pi * t),
     ]  # fmt: skip
-    return {**base, "phi": np.array(phi)}
+    # a smooth process of unit order (cosine series of a Brownian path) along the logarithm of the speed: a form that
+    # differs by a power of it does so by as much at every speed
+    top = rec.actuator.bus_voltage / (2.0 * rec.actuator.back_emf)
+    far = np.log1p(np.abs(rec.speed) / SLOW) / np.log1p(top / SLOW)
+    smooth = [np.sqrt(2.0) / k * np.cos(np.pi * k * far) for k in range(1, SMOOTH + 1)]
+    return {**base, "phi": np.array(phi), "own": _own(phi, smooth)}
+
+
+def _own(phi: Sequence[np.ndarray], smooth: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Functions of an own form, (row,) each, from those of a remainder and smooth ones of the speed."""
+    return [*phi[:2], *smooth, *phi[LEVEL:14]]
 
 
 def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) -> dict[str, Any]:
@@ -47,7 +61,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     samples, what they lie along; (row,) each. ``functions`` as ``functions_of`` has them."""
     rec = state.rec
     base = dict(functions)
-    phi = list(base.pop("phi"))
+    phi, own = list(base.pop("phi")), base.pop("own")
     kinds: dict[str, Any] = {
         "slow": SLOW_FUNCTIONS,
         "each": [f - (equation == "control" and f > LEVEL) for f in EACH],
@@ -65,8 +79,10 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     if of is None:
         return kinds
     along = {k: of(v) for k, v in base.items()}
+    phi = [of(f) for f in phi]
     return {
-        **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": np.array([of(f) for f in phi]), **kinds,
+        **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": np.array(phi),
+        "own": _own(phi, [of(f) for f in own[2 : 2 + SMOOTH]]), **kinds,
     }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
 from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
-from .coordinates import ALONG, coordinates_of, drivers_of, functions_of, rows_of
+from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
 from .parameters import internal, measuring_chain, nuisances, unit_of
 from .point import Point, State
@@ -73,8 +73,12 @@ class ReferenceActuator:
                     self.parameters[full] = Parameter(full, q.off, q.off, 0.0, q.units, fixed=True)
 
     def families(self, equation: str) -> tuple[tuple[int, ...], ...]:
-        """Functions of a remainder or an own form that go along one coordinate; none of the controller's equations."""
+        """Functions of a remainder that go along one coordinate; none of the controller's equations."""
         return () if equation in SETTINGS else ALONG
+
+    def own_families(self, equation: str) -> tuple[tuple[int, ...], ...]:
+        """Functions of an own form that go along one coordinate; none of the controller's equations."""
+        return () if equation in SETTINGS else OWN_ALONG
 
     def observed(self) -> dict[str, dict[str, float]]:
         """Effects that the recordings show for certain, with their parameters: a speed that lies on a lattice."""

@@ -155,6 +155,8 @@ class Recorded:
         """A remainder goes along all coordinates together: few rows tell them apart."""
         return ()
 
+    own_families = families
+
     def functions(self, rows: Rows) -> np.ndarray:
         """(function, row): a constant, smooth and faster functions of the coordinates, one for each place."""
         found = [np.ones(rows.size)]
@@ -188,7 +190,8 @@ class Recorded:
         along = {n: np.zeros(rows.size) for n in ALONG} | _along(rows)
         if "order" in along:  # told where it has been found: see ``told_along``
             along["rotor_angle"] = along["order"]
-        return {**along, "phi": self.functions(rows), "drivers": np.ones((1, rows.size)), "slow": ()}
+        phi = self.functions(rows)
+        return {**along, "phi": phi, "own": phi[:SMOOTH], "drivers": np.ones((1, rows.size)), "slow": ()}
 
     def told_along(self, along: str) -> str:
         """A coordinate's name in the verdict."""
