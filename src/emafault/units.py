@@ -8,7 +8,7 @@ from .errors import InputError
 _SPELT = {
     "°": "degree", "°C": "degC", "C": "degC", "1/min": "rpm", "u/min": "rpm", "min-1": "rpm", "rev/min": "rpm",
     "%": "percent", "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "second": "s", "seconds": "s",
-    "sec": "s", "radian": "rad", "radians": "rad",
+    "sec": "s", "radian": "rad", "radians": "rad", "rpm": "rpm", "Nm": "N m",
 }  # fmt: skip
 
 

@@ -55,6 +55,9 @@ def test_a_listing_has_units_and_rates(short, tmp_path):
         ("a.parquet", b"no", "cannot be read as .parquet"),
         ("a.mcap", b"no", "cannot be read as .mcap"),
         ("a.h5", b"no", "cannot be read as .h5"),
+        ("a.npz", b"no", "cannot be read as .npz"),
+        ("a.csv.gz", b"no", "cannot be read as .csv.gz"),
+        ("a.mat.gz", b"no", "unpack it"),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_what_to_do(name, content, says, tmp_path):
@@ -75,3 +78,8 @@ def test_a_decimal_comma_is_not_a_separator(tmp_path):
     (tmp_path / "a.csv").write_text("t;u\n0,0;1,5\n0,1;2,5\n")
     found = read_raw(tmp_path / "a.csv")
     assert np.array_equal(found["u"], [1.5, 2.5]) and np.allclose(found["time"], [0.0, 0.1])
+
+
+def test_milliseconds_may_stand_behind_a_third_colon(tmp_path):
+    (tmp_path / "a.csv").write_text("Timestamp,u\n2019-11-05 17:14:08:947,1\n2019-11-05 17:14:09:002,2\n")
+    assert read_raw(tmp_path / "a.csv")["time"].to_numpy() == pytest.approx([0.0, 0.055])

@@ -122,17 +122,21 @@ def hdf5(path, log):
             group[name].attrs["units"] = log.units[name]
 
 
+def npz(path, log):
+    np.savez(path, time=log.time, **log.channels)
+
+
 #: name of a file -> its writer
 WRITERS = {
     "plain.csv": csv, "european.csv": european_csv, "oscilloscope.csv": oscilloscope_csv, "counted.csv": counted_csv,
     "log.tsv": tsv, "log.parquet": parquet, "v5.mat": mat, "v73.mat": mat_73, "log.tdms": tdms, "log.mf4": mf4,
-    "bag": bag, "log.nc": netcdf, "log.h5": hdf5,
+    "bag": bag, "log.nc": netcdf, "log.h5": hdf5, "packed.csv.gz": csv, "log.npz": npz,
 }  # fmt: skip
 #: files -> name of a channel in them, where it is not that of the log
 NAMED = {
     "v5.mat": "log/{}", "v73.mat": "log/{}", "log.tdms": "daq/{}", "log.h5": "daq/{}",
 }  # fmt: skip
-WITHOUT_UNITS = ("v5.mat", "v73.mat", "bag")
+WITHOUT_UNITS = ("v5.mat", "v73.mat", "bag", "log.npz")
 
 
 def channel(file, name, names):

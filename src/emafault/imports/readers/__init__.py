@@ -16,6 +16,8 @@ from ...errors import InputError
 #: extension -> module here, and the extra that installs its library
 READERS = {
     ".csv": ("text", "import"), ".tsv": ("text", "import"), ".txt": ("text", "import"),
+    ".csv.gz": ("text", "import"), ".tsv.gz": ("text", "import"), ".txt.gz": ("text", "import"),
+    ".npz": ("npz", "import"),
     ".parquet": ("parquet", "parquet"), ".mat": ("mat", "mat"), ".tdms": ("tdms", "tdms"),
     ".mf4": ("mdf", "mdf"), ".mdf": ("mdf", "mdf"), ".bag": ("ros", "ros"), ".mcap": ("ros", "ros"),
     ".nc": ("netcdf", "import"), ".h5": ("netcdf", "import"), ".hdf5": ("netcdf", "import"),
@@ -26,8 +28,9 @@ INSTEAD = {
     ".isf": "save the waveform as CSV on the oscilloscope", ".bin": "save the waveform as CSV on the oscilloscope",
     ".psdata": "save the waveform as CSV or MAT in PicoScope", ".slx": "log to a .mat file", ".tdm": "save as TDMS",
     ".blf": "convert it to MF4 with its database", ".asc": "convert it to MF4 with its database",
-    ".dat": "convert it to MF4 or CSV", ".ulg": "convert it to CSV", ".npz": "save it as HDF5 or CSV",
-    ".npy": "save it as HDF5 or CSV", ".json": "save it as CSV or Parquet", ".zip": "unpack it",
+    ".dat": "convert it to MF4 or CSV", ".ulg": "convert it to CSV",
+    ".npy": "save it as .npz, HDF5 or CSV", ".json": "save it as CSV or Parquet", ".zip": "unpack it",
+    ".gz": "unpack it",
 }  # fmt: skip
 
 
@@ -43,6 +46,8 @@ def read_raw(path: str | Path):
     if not path.exists():
         raise InputError(f"{path}: no such file")
     suffix = ".mcap" if path.is_dir() else path.suffix.lower()
+    packed = "".join(path.suffixes[-2:]).lower()
+    suffix = packed if packed in READERS else suffix
     if suffix in INSTEAD:
         raise InputError(f"{path}: {suffix} cannot be read; {INSTEAD[suffix]}")
     if suffix not in READERS:

@@ -33,6 +33,9 @@ def from_frame(frame, units=None):
         unit = (units or {}).get(column, unit)
         if time is None and is_time(name):
             if not pd.api.types.is_numeric_dtype(values):
+                if not pd.api.types.is_datetime64_any_dtype(values):
+                    # some loggers write the milliseconds behind a third colon
+                    values = values.astype(str).str.replace(r"(:\d\d:\d\d):(\d+)$", r"\1.\2", regex=True)
                 stamps = pd.to_datetime(values)
                 time = (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy()
             else:
@@ -40,3 +43,31 @@ def from_frame(frame, units=None):
         elif pd.api.types.is_numeric_dtype(values) and not values.isna().all():
             channels[name] = values.to_numpy(np.float64, na_value=np.nan), unit
     return dataset({"time": (time, channels)})
+
+
+def from_arrays(content):
+    """Dataset of the numeric vectors in nested arrays; those of one level and length share its vector of times."""
+    groups: dict[str, tuple[np.ndarray | None, dict]] = {}
+    for name, values in _vectors(content, ""):
+        group = f"{name.rpartition('/')[0] or 'samples'}:{len(values)}"
+        time, channels = groups.get(group, (None, {}))
+        groups[group] = (values, channels) if is_time(name) else (time, {**channels, name: (values, "")})
+    return dataset(groups)
+
+
+def _vectors(content, above: str):
+    """Yield (path in the file, vector) of every numeric vector; the columns of a matrix one by one."""
+    for key, value in content.items():
+        name = f"{above}/{key}" if above else key
+        if isinstance(value, dict):
+            yield from _vectors(value, name)
+            continue
+        array = np.asarray(value)
+        if key.startswith("__") or array.dtype.kind not in "fiub" or array.size < 2:
+            continue
+        array = array.squeeze()
+        if array.ndim == 1:
+            yield name, array
+        elif array.ndim == 2:
+            columns = array if array.shape[0] >= array.shape[1] else array.T
+            yield from ((f"{name}({k + 1})", column) for k, column in enumerate(columns.T))

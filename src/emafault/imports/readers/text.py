@@ -1,5 +1,6 @@
 """CSV and TSV, from loggers and oscilloscopes: separator, decimal comma, preamble and units are found."""
 
+import gzip
 import re
 from pathlib import Path
 
@@ -25,7 +26,7 @@ def read(path: Path):
     import pandas as pd
 
     encoding = _encoding(path)
-    with open(path, encoding=encoding) as file:
+    with _opened(path)(path, "rt", encoding=encoding) as file:
         lines = [line.rstrip("\r\n") for _, line in zip(range(LOOKED_AT), file, strict=False)]
     separator, decimal, first = _layout(path, lines)
     cells = [_split(line, separator) for line in lines[:first]]
@@ -34,6 +35,7 @@ def read(path: Path):
     frame = pd.read_csv(
         path, sep=separator or r"\s+", decimal=decimal, skiprows=first, header=None, encoding=encoding,
         names=range(width), index_col=False, skipinitialspace=True, low_memory=False,
+        compression="gzip" if _opened(path) is gzip.open else None,
     )  # fmt: skip
     titles, units = _header(cells, width)
     if "Increment" in titles:  # an oscilloscope that counts samples and gives their step once
@@ -46,12 +48,17 @@ def read(path: Path):
     return from_frame(frame.dropna(axis=1, how="all"))
 
 
+def _opened(path: Path):
+    return gzip.open if path.suffix.lower() == ".gz" else open
+
+
 def _encoding(path: Path) -> str:
-    head = path.read_bytes()[:4]
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    with _opened(path)(path, "rb") as file:
+        content = file.read()
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     try:
-        path.read_text(encoding="utf-8-sig")
+        content.decode("utf-8-sig")
         return "utf-8-sig"
     except UnicodeDecodeError:
         return "latin-1"
