@@ -442,10 +442,15 @@ def refuse(key: str, got: Any, accepted: str) -> typing.NoReturn:
 
 def unknown_key(name: object, parent: str, known: Iterable[str]) -> str:
     """The one line that refuses a key that does not exist."""
-    close = difflib.get_close_matches(str(name), list(known), 1)
-    hint = f" (did you mean {close[0]}?)" if close else ""
     full = f"{parent}.{shown(name)}" if parent else shown(name)
-    return f"{full}: there is no such key{hint}; {parent or 'the configuration'} accepts {', '.join(sorted(known))}"
+    accepts = f"{parent or 'the configuration'} accepts {', '.join(sorted(known))}"
+    return f"{full}: there is no such key{near(name, known)}; {accepts}"
+
+
+def near(name: object, known: Iterable[str]) -> str:
+    """What to add to a line that refuses a name: the known one most like it; empty where none is."""
+    close = difflib.get_close_matches(str(name), list(known), 1)
+    return f" (did you mean {close[0]}?)" if close else ""
 
 
 def _accepted_number(kind: type, low: float, high: float, unit: str) -> str:

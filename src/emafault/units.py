@@ -56,6 +56,24 @@ def factor(unit: str, wanted: str, where: str) -> float:
         raise InputError(f"{where}: the unit '{unit}' is not one of {wanted} ({error})") from error
 
 
+def converted(values, unit: str, wanted: str, where: str):
+    """Numbers in ``unit`` in ``wanted``, temperatures with their zero.
+
+    Raises
+    ------
+    InputError : a unit that is none or of another kind
+    """
+    units = registry()
+    try:
+        given, target = units.parse_units(spelt(unit)), units.parse_units(wanted)
+        out = units.Quantity(values, given).to(target).magnitude
+    except Exception as error:
+        raise InputError(f"{where}: the unit '{unit}' is not one of {wanted} ({error})") from error
+    if "hertz" in str(given) and str(given) != str(target):  # which pint takes for rad/s
+        raise InputError(f"{where}: the unit '{unit}' does not say of what; accepted are turn/s, rad/s and the like")
+    return out
+
+
 def quantity(given, wanted: str, where: str) -> float:
     """A number, taken to be in ``wanted``, or a text as "200 us" or "21.5 degC", in ``wanted``.
 

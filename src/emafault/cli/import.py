@@ -1,4 +1,4 @@
-"""``emafault import``: measured files and a map -> a bench of recordings."""
+"""``emafault import``: measured files and a map -> a bench of recordings, or the tables of another kind of machine."""
 
 import argparse
 from pathlib import Path
@@ -37,7 +37,15 @@ def run(args: argparse.Namespace) -> None:
     if args.map:
         if not args.out:
             raise InputError("--map: needs --out DIR, a folder to write to")
-        _import(args.map, args.out, with_actuator(args, args.overrides), args.force)
+        from ..imports.mapping import read_map
+
+        given = read_map(args.map)
+        if "machine" not in given:
+            _import(args.map, args.out, with_actuator(args, args.overrides), args.force)
+        elif files or args.actuator:
+            raise InputError(f"{args.map}: names a machine, for which neither overrides nor --actuator are accepted")
+        else:
+            _import_tables(given, args.map, args.out, args.force)
         return
     if not files:
         raise InputError("no file is named; name at least one")
@@ -70,3 +78,14 @@ def _import(path: str, out: str, overrides: list[str], force: bool) -> None:
         for text in dict.fromkeys(lost):
             print(f"{name}: {text}")
     print(f"{', '.join(result.recordings)} and import.html written to {out}")
+
+
+def _import_tables(given, path: str, out: str, force: bool) -> None:
+    from ..imports.tables import import_tables
+
+    notes = import_tables(given, path, out, force)
+    for name, done in notes.items():
+        for text in done:
+            print(f"{name}: {text}")
+    machine = given["machine"]
+    print(f"{', '.join(notes)} written to {out}; next: emafault diagnose {out} --twin {machine}")

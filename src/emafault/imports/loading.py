@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.recording import VARIABLES
+from ..schema import near
 from ..units import factor, quantity
 from .hall import angle_of_halls
 from .mapping import PHASED
@@ -52,11 +53,9 @@ def _load_one(given: Mapping[str, Any], entry: Mapping[str, Any], pole_pairs: in
 
     def channel(name: str, wanted: str, spec: Mapping[str, Any], averaged: bool, title: str) -> Signal:
         logger = spec["logger"]
-        if logger not in files:
-            raise InputError(f"{raw.name}: {title} is of the logger {logger}, which has no file here; add it to files")
-        path, found = entry["files"][logger], files[logger]
+        path, found = channel_of(entry, files, logger, name, title)
         settings = given["loggers"][logger]
-        values, time = _values(path, found, name), _time(path, found, name, settings)
+        values, time = found[name].to_numpy(), time_of(path, found, name, settings)
         unit = spec.get("unit", found[name].attrs.get("units", ""))
         counts = spec.get("counts_per_turn")
         known = bool(counts or unit or wanted == "1")
@@ -100,14 +99,33 @@ def _nth(value, k: int):
     return value[k] if isinstance(value, list) else value
 
 
-def _values(path: str, found, name: str) -> np.ndarray:
-    if name not in found:
-        raise InputError(f"{path}: no channel '{name}'; there are {', '.join(map(str, found.data_vars))}")
-    return found[name].to_numpy()
+def channel_of(entry: Mapping[str, Any], files: Mapping[str, Any], logger: str, name: str, title: str):
+    """Path and dataset of the logger's file of a recording, which holds the channel ``name`` of the signal ``title``.
+
+    Raises
+    ------
+    InputError : the logger has no file, or the file no such channel
+    """
+    if logger not in files:
+        raise InputError(f"{entry['name']}: {title} is of the logger {logger}, which has no file here; add it to files")
+    path, found = entry["files"][logger], files[logger]
+    if name not in found.data_vars:
+        channels = [str(n) for n in found.data_vars]
+        raise InputError(f"{path}: no channel '{name}'{near(name, channels)}; there are {', '.join(channels)}")
+    return path, found
 
 
-def _time(path: str, found, name: str, settings: Mapping[str, Any]) -> np.ndarray:
-    """Times (s) of a channel, from its first sample on where they are counted."""
+def time_of(path: str, found, name: str, settings: Mapping[str, Any], repeated: bool = False) -> np.ndarray:
+    """Times (s) of a channel, from its first sample on where they are counted.
+
+    Parameters
+    ----------
+    repeated : whether a time may stand twice, as clocks of coarse resolution write it
+
+    Raises
+    ------
+    InputError : there are none, or they go back
+    """
     count = found[name].size
     if "rate" in settings:
         return np.arange(1, count + 1) / quantity(settings["rate"], "Hz", "rate")
@@ -120,7 +138,7 @@ def _time(path: str, found, name: str, settings: Mapping[str, Any]) -> np.ndarra
     else:
         raise InputError(f"{path}: '{name}' has no times; say loggers.<name>.rate, or .time for their channel")
     steps = np.diff(time)
-    if count < 2 or not np.all(np.isfinite(time)) or np.any(steps <= 0.0):
+    if count < 2 or not np.all(np.isfinite(time)) or np.any(steps < 0.0 if repeated else steps <= 0.0):
         raise InputError(f"{path}: the times of '{name}' do not increase everywhere; export it anew, or say the rate")
     return time
 

@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..plain import read_yaml
 
 SCHEMA = Path(__file__).with_name("map.schema.json")
+MACHINE_SCHEMA = Path(__file__).with_name("machine_map.schema.json")  # of a map that names a machine of another kind
 BLANK = "???"  # what a guessed map leaves for its owner to say
 PHASED = ("phase_voltage", "phase_current", "phase_current_end")
 
@@ -34,6 +35,8 @@ def complete(content: Any, path: Path) -> dict[str, Any]:
     _validate(content, path)
     loggers = content.get("loggers") or {"logger": {}}
     first = next(iter(loggers))
+    machine = content.get("machine", "")
+    content = content | ({"machine": str(path.parent / machine)} if machine.endswith(".py") else {})
     loggers = {
         name: {"samples": "instants", "stamp": "end", "clock": "same"} | given for name, given in loggers.items()
     }
@@ -73,6 +76,7 @@ def _validate(content: Any, path: Path) -> None:
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
-    error = best_match(Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8"))).iter_errors(content))
+    schema = MACHINE_SCHEMA if "machine" in content else SCHEMA
+    error = best_match(Draft202012Validator(json.loads(schema.read_text(encoding="utf-8"))).iter_errors(content))
     if error is not None:
         raise InputError(f"{path}: {'.'.join(map(str, error.absolute_path)) or 'the map'}: {error.message}")

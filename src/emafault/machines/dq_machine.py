@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recorded.dq_machine import distortions, read, recordings
+from .recorded.dq_machine import UNITS, distortions, read, recordings
 from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, nuisance, scaled
 
-__all__ = ["build", "distortions", "experiments", "read"]
+__all__ = ["UNITS", "build", "distortions", "experiments", "read"]
 NAME = "dq_machine"
 IRON_LOSS = 0.02  # of the apparent power: iron loss that a machine of this kind has
 Values = Mapping[str, np.ndarray]

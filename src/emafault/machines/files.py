@@ -1,4 +1,4 @@
-"""Readers of tables and arrays, which refuse in one line what cannot be used."""
+"""Readers of tables and arrays, which refuse in one line what cannot be used, and their writer."""
 
 import csv
 import gzip
@@ -77,6 +77,19 @@ def read_arrays(path: Path) -> Arrays:
             return {name: np.asarray(store[name], float) for name in store.files}
     except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as problem:
         raise InputError(f"{path}: cannot be read as an .npz file of numbers ({problem})") from None
+
+
+def write_columns(path: Path, columns: Arrays) -> None:
+    """Write columns as an .npz file, or as gzip CSV in which a single number () stands in every row."""
+    if path.suffix == ".npz":
+        np.savez_compressed(path, **columns)  # type: ignore[arg-type]  # numpy takes a keyword of another type too
+        return
+    cells = [
+        ["" if np.isnan(x) else repr(x) for x in values.tolist()] for values in np.broadcast_arrays(*columns.values())
+    ]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([list(columns), *zip(*cells, strict=True)])
+    path.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
 
 
 def require_finite(path: object, arrays: Arrays, names: Sequence[str], rows: int) -> None:

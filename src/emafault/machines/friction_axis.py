@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recorded.friction_axis import distortions, read, recordings
+from .recorded.friction_axis import ENDING, UNITS, distortions, read, recordings
 from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, nuisance, scaled
 
-__all__ = ["build", "distortions", "experiments", "read"]
+__all__ = ["ENDING", "UNITS", "build", "distortions", "experiments", "read"]
 NAME = "friction_axis"
 
 

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import util
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +24,8 @@ _MODULES: dict[str, ModuleType] = {
     "induction_currents": induction_currents,
 }
 MEASURED = tuple(_MODULES)
+MAPPABLE = tuple(name for name, module in _MODULES.items() if hasattr(module, "UNITS"))
+ENDINGS = (".csv.gz", ".npz")
 NEEDED = ("read", "build")
 ACCEPTED = "accepted is a Python file with read(path) -> {case: arrays} and build(case, arrays) -> Machine"
 
@@ -36,10 +38,17 @@ class Stated:
     read: Callable[[Path], Mapping[str, Arrays]]
     build: Callable[[str, Arrays], Machine]
     distortions: Sequence[Distortion] = ()
+    units: Mapping[str, str] = field(default_factory=dict)  # of the columns that an import map may fill
+    optional: Sequence[str] = ()  # of these
+    ending: str = ENDINGS[0]  # of the file of them that it reads
 
 
-def stated(name: str) -> Stated:
+def stated(name: str, what: str = "--twin") -> Stated:
     """The machine of this name, or of this Python file.
+
+    Parameters
+    ----------
+    what : key or option that gives the name
 
     Raises
     ------
@@ -50,7 +59,7 @@ def stated(name: str) -> Stated:
         return _of(name, _MODULES[name])
     if not name.endswith(".py"):
         raise InputError(
-            f"--twin: got '{shown(name)}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"
+            f"{what}: got '{shown(name)}', accepted are {', '.join(MEASURED)} and a Python file that states a machine"
         )
     if kind(name) != "file":
         raise InputError(f"{shown(name)}: no such file; {ACCEPTED}")
@@ -73,7 +82,17 @@ def stated(name: str) -> Stated:
 
 def _of(name: str, module: ModuleType) -> Stated:
     distortions = getattr(module, "distortions", None)
-    return Stated(name, module.read, module.build, tuple(distortions()) if distortions else ())
+    units, optional = getattr(module, "UNITS", {}), tuple(getattr(module, "OPTIONAL", ()))
+    ending = getattr(module, "ENDING", ENDINGS[0])
+    if not isinstance(units, Mapping) or not all(isinstance(u, str) for u in units.values()):
+        raise InputError(f"{name}: UNITS is {shown(repr(units))}, accepted is column -> unit")
+    if not set(optional) <= set(units):
+        raise InputError(f"{name}: OPTIONAL names {', '.join(set(optional) - set(units))}, accepted are keys of UNITS")
+    if ending not in ENDINGS:
+        raise InputError(f"{name}: ENDING is {shown(repr(ending))}, accepted are {', '.join(ENDINGS)}")
+    return Stated(
+        name, module.read, module.build, tuple(distortions()) if distortions else (), units, optional, ending
+    )  # fmt: skip
 
 
 def read_cases(machine: Stated, path: Path) -> dict[str, Arrays]:

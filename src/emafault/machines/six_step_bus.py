@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recorded.six_step_bus import TAU, distortions, read, recordings
+from .recorded.six_step_bus import OPTIONAL, TAU, UNITS, distortions, read, recordings
 from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, nuisance, scaled
 
-__all__ = ["build", "distortions", "experiments", "read"]
+__all__ = ["OPTIONAL", "UNITS", "build", "distortions", "experiments", "read"]
 NAME = "six_step_bus"
 SPAN = float(np.log(TAU[-1] / TAU[0]))  # of the logarithm of a thermal time constant over the shortest
 Values = Mapping[str, np.ndarray]

@@ -51,7 +51,8 @@ def from_arrays(content):
     for name, values in _vectors(content, ""):
         group = f"{name.rpartition('/')[0] or 'samples'}:{len(values)}"
         time, channels = groups.get(group, (None, {}))
-        groups[group] = (values, channels) if is_time(name) else (time, {**channels, name: (values, "")})
+        first = time is None and is_time(name)  # a later one, as x beside t, is a channel
+        groups[group] = (values, channels) if first else (time, {**channels, name: (values, "")})
     return dataset(groups)
 
 

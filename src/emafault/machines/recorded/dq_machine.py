@@ -10,7 +10,11 @@ from ..files import read_columns, require_finite
 from ..statement import Arrays, Distortion, Rows
 from ..statistics import mean_variance, smooth_error
 
-COLUMNS = ("u_d", "u_q", "i_d", "i_q", "motor_speed", "torque", "pm", "stator_winding")
+UNITS = {
+    "u_d": "V", "u_q": "V", "i_d": "A", "i_q": "A", "motor_speed": "rpm", "torque": "N m", "pm": "degC",
+    "stator_winding": "degC",
+}  # fmt: skip
+COLUMNS = tuple(UNITS)
 REFERENCE_TEMPERATURE = 20.0  # degC, at which R, psi and the inductances are stated
 ACCURACY = 0.005  # of the largest value: how far the recorded voltages and torque are trusted
 STEADY = 0.01  # relative change of speed or current between rows above which a row is a transient

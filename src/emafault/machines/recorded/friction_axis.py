@@ -12,6 +12,8 @@ from ..files import read_arrays, require_finite
 from ..statement import Arrays, Distortion, Rows
 from ..statistics import mean_variance
 
+UNITS = {"t": "s", "qm": "m", "vir": "V", "gtau": "N/V"}
+ENDING = ".npz"
 ACCURACY = 0.002  # of the largest force in a mean over one bin
 BANDWIDTH = 40.0  # Hz, the same filter for position and force before they are binned
 SPEED_BINS = 5
@@ -28,16 +30,16 @@ def read(path: Path) -> dict[str, Arrays]:
         when one is missing, values are not finite, time does not rise evenly, or it is too short.
     """
     arrays = read_arrays(path)
-    for name in ("t", "qm", "vir", "gtau"):
+    for name in UNITS:
         if name not in arrays:
-            raise InputError(f"{path}: array {name!r} is missing; needed are t, qm, vir, gtau")
+            raise InputError(f"{path}: array {name!r} is missing; needed are {', '.join(UNITS)}")
     require_finite(path, arrays, ("t", "qm", "vir"), rows=2000)
     step = np.diff(arrays["t"])
     if not (step.min() > 0 and step.max() < 1.5 * np.median(step)):
         raise InputError(f"{path}: 't' must rise in even steps")
     if not np.isfinite(arrays["gtau"]).all() or arrays["gtau"].size != 1:
         raise InputError(f"{path}: 'gtau' must be one number, N/V")
-    return {Path(path).name.split(".")[0]: {name: arrays[name] for name in ("t", "qm", "vir", "gtau")}}
+    return {Path(path).name.split(".")[0]: {name: arrays[name] for name in UNITS}}
 
 
 def filtered_motion(arrays: Arrays) -> Arrays:

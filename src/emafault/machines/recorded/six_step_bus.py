@@ -22,6 +22,11 @@ FORMS = {
         t="Time (s)", v="Voltage (V)", i="Current (A)", w="Motor Electrical Speed (RPM)", T="Torque (N·m)"
     ),
 }  # fmt: skip
+UNITS = {
+    "t_s": "s", "duty": "1", "v_bus_esc_V": "V", "i_bus_esc_A": "A", "speed_rad_s": "rad/s", "v_bus_bench_V": "V",
+    "i_bus_bench_A": "A", "torque_bench_Nm": "N m",
+}  # fmt: skip
+OPTIONAL = ("v_bus_bench_V", "i_bus_bench_A", "torque_bench_Nm")  # of the merged table: the second instrument
 SETTLE = 1.0  # s after a step before a plateau counts as steady
 CONTINUOUS_DUTY = 0.25  # below it the phase current is not the bus current over the duty
 # of the largest value: how far a simple model of such a drive and its instruments are trusted
@@ -39,12 +44,12 @@ def read(path: Path) -> dict[str, Arrays]:
     """
     table = read_table(path)
     for form, names in FORMS.items():  # noqa: B007
-        if all(column in table for column in names.values()):
+        if all(column in table for column in names.values() if column not in OPTIONAL):
             break
     else:
         needed = "; ".join(f"{form}: {', '.join(names.values())}" for form, names in FORMS.items())
         raise InputError(f"{path}: columns of no known log; needed are those of one of {needed}")
-    arrays = {key: to_numbers(table[column]) for key, column in names.items()}
+    arrays = {key: to_numbers(table[column]) for key, column in names.items() if column in table}
     if form == "controller log":
         arrays["t"] = _clock(path, table["Timestamp"])
         arrays["duty"] = arrays["duty"] / 100
