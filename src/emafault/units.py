@@ -69,8 +69,8 @@ def converted(values, unit: str, wanted: str, where: str):
         out = units.Quantity(values, given).to(target).magnitude
     except Exception as error:
         raise InputError(f"{where}: the unit '{unit}' is not one of {wanted} ({error})") from error
-    if "hertz" in str(given) and str(given) != str(target):  # which pint takes for rad/s
-        raise InputError(f"{where}: the unit '{unit}' does not say of what; accepted are turn/s, rad/s and the like")
+    if ("hertz" in str(given)) != ("hertz" in str(target)):  # pint takes one for a rad/s
+        raise InputError(f"{where}: the unit '{unit}' is not one of {wanted} (a turn a second is 'turn/s')")
     return out
 
 

@@ -8,8 +8,10 @@ import pytest
 import yaml
 
 from emafault.cli import main
+from emafault.errors import InputError
 from emafault.machines.files import read_arrays
 from emafault.machines.library import read_cases, stated
+from emafault.units import converted
 from machines import line
 
 DATA = Path(__file__).parents[2] / "data" / "measured"
@@ -117,7 +119,7 @@ def test_a_machine_of_ones_own_needs_its_file_and_a_map(bench, capsys):
         (changed(w={"channel": "sped", "unit": "rpm"}), r"no channel 'sped' \(did you mean speed\?\); there are"),
         (changed(w={"channel": "speed"}), "'speed' has no unit; say signals.w.unit in the map, as rad/s"),
         (changed(w={"channel": "speed", "unit": "A"}), "'speed' for signals.w: the unit 'A' is not one of rad/s"),
-        (changed(w={"channel": "speed", "unit": "Hz"}), "the unit 'Hz' does not say of what; accepted are turn/s"),
+        (changed(w={"channel": "speed", "unit": "Hz"}), "the unit 'Hz' is not one of rad/s .a turn a second"),
         (changed(v=None), r"map.yaml: signals: 'v' is missing; mine needs w, i, v, recording"),
         (changed(volts={"channel": "u"}), r"signals.volts: there is no such key; .*signals accepts i, recording, v, w"),
         (changed(v={"channel": "u", "unti": "V"}), "signals.v: .*'unti' was unexpected"),
@@ -144,6 +146,12 @@ def test_a_table_that_the_twin_refuses_is_not_written(bench, capsys):
     assert run(bench, MINE) == 2
     assert "emafault import: bench.csv.gz: 'w' has 5 rows, at least 10 are needed\n" == capsys.readouterr().err
     assert not (bench / "out").exists()
+
+
+def test_frequencies_and_speeds_are_two_things():
+    assert converted(2.0, "kHz", "Hz", "x") == 2000.0 and converted(1.0, "turn/s", "rad/s", "x") == 2.0 * np.pi
+    with pytest.raises(InputError, match="x: the unit 'rpm' is not one of Hz"):
+        converted(1.0, "rpm", "Hz", "x")
 
 
 def test_options_of_the_actuator_are_refused(bench, capsys):

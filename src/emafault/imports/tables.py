@@ -12,13 +12,12 @@ from ..errors import InputError
 from ..io.atomic import replace_atomically
 from ..machines.files import write_columns
 from ..machines.library import MAPPABLE, Stated, read_cases, stated
+from ..machines.statement import Arrays
 from ..places import refuse_folder, refuse_output
 from ..schema import unknown_key
 from ..units import converted, factor, quantity
 from .loading import channel_of, time_of
 from .readers import read_raw
-
-Columns = dict[str, np.ndarray]
 
 
 def import_tables(given: Mapping[str, Any], path: str | Path, out: str | Path, force: bool = False) -> dict[str, list]:
@@ -71,7 +70,7 @@ def _refuse_columns(given: Mapping[str, Any], path: str | Path, machine: Stated)
             raise InputError(f"{path}: signals: {name!r} is missing; {machine.name} needs {', '.join(needed)}")
 
 
-def table_of(given: Mapping[str, Any], entry: Mapping[str, Any], units: Mapping[str, str]) -> tuple[Columns, list[str]]:
+def table_of(given: Mapping[str, Any], entry: Mapping[str, Any], units: Mapping[str, str]) -> tuple[Arrays, list[str]]:
     """Columns in these units, (row,) or of a stated value (), and what was done to rows.
 
     Rows are the samples of the first logger's first signal. What was sampled at other times is interpolated there; rows
@@ -89,7 +88,7 @@ def table_of(given: Mapping[str, Any], entry: Mapping[str, Any], units: Mapping[
         raise InputError(f"{entry['name']}: no signal is of {first}, the first logger, whose samples are the rows")
     rows, values = measured[ours[0]]
     keep, between = np.ones(values.size, bool), []
-    columns: Columns = {}
+    columns: Arrays = {}
     for name, spec in signals.items():
         if "value" in spec:
             columns[name] = np.array(quantity(spec["value"], units[name], f"signals.{name}.value"))
