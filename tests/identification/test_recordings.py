@@ -7,6 +7,7 @@ import pytest
 
 from emafault import config
 from emafault.dataset import simulate_blocks, simulate_recording
+from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES
 from emafault.identification.fitting import Prior, TrainingRows, fit_identifier
 from emafault.identification.recordings import Model, identify_recordings
@@ -71,3 +72,15 @@ def test_the_fit_of_simulated_recordings_is_that_of_noise(actuator, floating):
     assert np.mean(fit) == pytest.approx(1.0, abs=3.5 * np.sqrt(2.0 / np.sum(freedom)))
     scatter = (fit - 1.0) / np.sqrt(2.0 / freedom)
     assert np.std(scatter) == pytest.approx(1.0, abs=3.5 / np.sqrt(2.0 * scatter.size))
+
+
+@pytest.mark.parametrize(
+    ("factor", "says"), [(-1.0, "its sign is reversed"), (180.0 / np.pi, "as if in degrees"), (0.0, "channel is dead")]
+)
+def test_a_command_that_the_output_does_not_follow_is_refused_as_by_a_diagnosis(models, factor, says):
+    plain = simulated()
+    wrong = replace(plain, name="r.nc", commanded_position=factor * plain.commanded_position, attributes={})
+    with pytest.raises(InputError, match=f"^r.nc: commanded_position .*{says}"):
+        identify_recordings(models["weighted"], [wrong])
+    with pytest.raises(InputError, match=f"^r.nc: commanded_position .*{says}"):
+        identify_recordings(models["weighted"], [plain], [wrong])

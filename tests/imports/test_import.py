@@ -122,6 +122,8 @@ REFUSED = {
     "a gap": (lambda x: x.change(out=lambda v: np.where(np.arange(len(v)) == 900, np.nan, v)), {}, "no value at 0.018"),
     "no unit": (lambda x: x, {"phase_voltage": {"unit": "kg"}}, "the unit 'kg' is not one of V"),
     "a channel that is not there": (lambda x: x, {"bus_voltage": {"channel": "vdc"}}, "no channel 'vdc'; there are ua"),
+    "command still": (lambda x: x.change(cmd=np.zeros_like), {}, "commanded_position: never moves"),
+    "command in degrees": (lambda x: x.change(cmd=np.rad2deg), {}, "commanded_position: moves 57.2.* in degrees"),
     "output still": (lambda x: x.change(out=np.zeros_like), {}, "output_position: never moves"),
 }  # fmt: skip
 

@@ -27,12 +27,12 @@ FAULT = (0.03, 0.0, 0.06, 0.05, -0.02)
 
 def record(
     command, settings, ambient, health, effects=None, seed=0, duration=0.5, interval=2e-4, clean=False, fault=FAULT,
-    theta_0=0.7,
+    theta_0=0.7, actuator=ACTUATOR,
 ):  # fmt: skip
     """One simulated recording, with noise unless ``clean``."""
     fault = np.array([*(fault if health == "unknown" else np.zeros(5)), ambient - 20.0])
-    runs = make_runs(ACTUATOR, fault[None], effects=effects or {}, theta_0=theta_0)
-    positions = command_positions(command, settings, duration, ACTUATOR.control_period)
+    runs = make_runs(actuator, fault[None], effects=effects or {}, theta_0=theta_0)
+    positions = command_positions(command, settings, duration, actuator.control_period)
     signals = simulate(runs, positions, duration, interval)
     signals = signals if clean else measure(signals, runs, NOISE, 100 + seed)
     soak = float(signals.pop("ambient_temperature", [ambient])[0])

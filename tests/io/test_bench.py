@@ -60,6 +60,26 @@ MISTAKEN = {
         lambda r: replace(r, output_position=r.commanded_position, commanded_position=r.output_position),
         "output_position",
     ),
+    "command's sign": (
+        lambda r: replace(r, commanded_position=-r.commanded_position),
+        "commanded_position goes against",
+    ),
+    "command in degrees": (
+        lambda r: replace(r, commanded_position=np.rad2deg(r.commanded_position)),
+        "commanded_position is 57.3 times what output_position follows, as if in degrees",
+    ),
+    "command in turns": (
+        lambda r: replace(r, commanded_position=r.commanded_position / (2.0 * np.pi)),
+        "commanded_position is 0.159 times what output_position follows, as if in turns",
+    ),
+    "command dead": (
+        lambda r: replace(r, commanded_position=0.0 * r.commanded_position),
+        "commanded_position never changes while output_position moves",
+    ),
+    "command of another motion": (
+        lambda r: replace(r, commanded_position=0.05 * np.sin(40.0 * r.time)),
+        "output_position does not follow commanded_position",
+    ),
     "kelvin": (lambda r: replace(r, ambient_temperature=r.ambient_temperature + 273.15), "ambient_temperature"),
 }
 USELESS = {
@@ -132,6 +152,41 @@ def test_a_coarsely_truncated_speed_is_no_mistaken_sensor_but_a_wrong_sign_or_un
     for wrong in (-speed, speed * 30.0 / np.pi):
         with pytest.raises(InputError, match="rotor_speed"):
             refuse_mistaken(NAME, replace(slow, rotor_speed=wrong), shop.actuator)
+
+
+def _with(shop, **factors):
+    """A bench under a controller whose settings are off by factors, in commands slow and fast."""
+    actuator = replace(shop.actuator, **{n: f * getattr(shop.actuator, n) for n, f in factors.items()})
+    plans = (
+        ("step", {"amplitude": 0.05, "time": 0.0}, 20.0, "healthy"),
+        ("ramp", {"speed": 1.5}, 20.0, "healthy"),
+        ("sine", {"amplitude": 0.013, "frequency": 6.0}, 20.0, "healthy"),
+        ("chirp", {"amplitude": 0.02, "frequency_start": 1.0, "frequency_end": 12.0}, 20.0, "healthy"),
+    )
+    return shop.make_bench({"speed_latency": {"tau": 0.005}}, plans, actuator=actuator)
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [
+        {"position_gain": 0.2},
+        {"position_gain": 3.0},
+        {"position_gain": 3.0, "speed_gain": 0.3, "speed_integral_gain": 0.3},
+        {"speed_limit": 0.3},
+        {"current_limit": 0.3},
+    ],
+    ids=str,
+)
+def test_a_controller_off_by_far_is_no_mistaken_command(shop, factors):
+    for name, recording in _with(shop, **factors).items():
+        refuse_mistaken(name, recording, shop.actuator)
+
+
+def test_a_ramp_in_degrees_is_told_from_one_too_fast(plain, shop):
+    """The nominal actuator cannot follow either, but what it does at a quarter of its speed is no limit."""
+    ramp = plain["recording_1.nc"]
+    with pytest.raises(InputError, match="as if in degrees"):
+        refuse_mistaken("r.nc", replace(ramp, commanded_position=np.rad2deg(ramp.commanded_position)), shop.actuator)
 
 
 def test_two_units_copies_and_broken_files(plain, shop, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
+from .command import refuse_unfollowed
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 
@@ -75,6 +76,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
             raise InputError(
                 f"{path}: output_position and commanded_position are swapped: the command goes with the rotor"
             )
+    refuse_unfollowed(path, recording, actuator)
     if recording.phase_current_end is not None:
         order = _best_order(_correlation(recording.phase_current, recording.phase_current_end))
         if order is not None and order != (0, 1, 2):
