@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.errors import InputError
+from emafault.io.scales import current_scales, speed_scale
 from emafault.io.sensors import refuse_mistaken
 
 POLE_PAIRS = 4
@@ -15,10 +16,12 @@ def scaled(name, factor):
     return lambda r: replace(r, **{n: getattr(r, n) * factor for n in (name, f"{name}_end") if hasattr(r, n)})
 
 
-def frozen(name, j):
+def frozen(name, j=...):
+    """A channel that stays the same from a third of the recording to two thirds."""
+
     def change(r):
-        x, half = getattr(r, name).copy(), len(r.time) // 2
-        x[half:, j] = x[half, j]
+        x, third = getattr(r, name).copy(), len(r.time) // 3
+        x[third : 2 * third, j] = x[third, j]
         return replace(r, **{name: x})
 
     return change
@@ -42,6 +45,14 @@ MISTAKES = {
     ),
     "a voltage frozen": (frozen("phase_voltage", 1), ("phase_voltage of phase b stays at", "frozen")),
     "a current frozen": (frozen("phase_current", 2), ("phase_current of phase c stays at", "frozen")),
+    "speed frozen": (frozen("rotor_speed"), ("rotor_speed stays at", "frozen")),
+    "angle frozen": (frozen("rotor_angle"), ("rotor_angle stays at", "frozen")),
+    "angle dead": (lambda r: replace(r, rotor_angle=0.0 * r.rotor_angle), ("rotor_angle stays at 0", "frozen")),
+    "output frozen": (frozen("output_position"), ("output_position stays at", "frozen")),
+    "bus frozen": (frozen("bus_voltage"), ("bus_voltage stays at", "frozen")),
+    "speed half as fast again": (scaled("rotor_speed", 1.5), ("rotor_speed is 1.5 times", "accepted is 0.8 to 1.2")),
+    "speed of 3 pole pairs for 4": (scaled("rotor_speed", 0.75), ("rotor_speed is 0.75 times", "accepted is 0.8")),
+    "a current half as large again": (scaled("phase_current", [1, 1.5, 1]), ("phase b has 1.5 times its size",)),
     "a voltage's offset": (
         lambda r: replace(r, phase_voltage=r.phase_voltage + np.array([5, 0, 0])),
         ("phase a has an offset",),
@@ -78,6 +89,36 @@ def test_a_lag_and_a_strong_effect_are_no_mistakes(plain, shop):
     refuse_mistaken(
         "r.nc", shop.record("sine", {"amplitude": 0.03, "frequency": 2.0}, 70.0, "unknown", strong), shop.actuator
     )
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_scales_that_a_diagnosis_names_or_describes_are_no_mistakes(plain, shop, factor):
+    """Those of the catalogue are a fifth of this and less, what no catalogue lists may be ten per cent."""
+    for r in plain.values():
+        for change in (scaled("rotor_speed", factor), scaled("phase_current", [1, factor, 1])):
+            refuse_mistaken("r.nc", change(r), shop.actuator)
+
+
+def test_a_coarse_channel_may_stay_the_same(plain, shop):
+    r = plain["recording_1.nc"]
+    bus, speed = np.round(r.bus_voltage), 5.0 * np.round(r.rotor_speed / 5.0)
+    assert np.ptp(bus) == 0.0
+    refuse_mistaken("r.nc", replace(r, bus_voltage=bus, rotor_speed=speed), shop.actuator)
+
+
+@pytest.mark.parametrize("name", ["recording_0.nc", "recording_2.nc"])
+def test_scales_are_those_that_channels_have_within_their_errors(plain, shop, name):
+    late = shop.record(
+        "sine", {"amplitude": 0.03, "frequency": 4.0}, 20.0, "healthy", {"speed_latency": {"tau": 0.005}}
+    )
+    for r in (plain[name], late):
+        for factor in (1.0, 1.02):
+            scale = speed_scale(scaled("rotor_speed", factor)(r))
+            assert abs(scale.value - factor) < 4.0 * scale.error < 0.02
+            a, b, c = current_scales(scaled("phase_current", [1.0, factor, 1.0])(r))
+            for found, truth in ((a, 1.0), (b, factor), (c, 1.0)):
+                assert abs(found.value - truth) < 4.5 * found.error < 0.01
+            assert bool(b.off) == (factor != 1.0) and not a.off and not c.off
 
 
 def test_a_constant_speed_tells_no_delay_from_the_zero_of_the_angle(shop):

@@ -9,7 +9,7 @@ channels are late by, which grows with speed and is no mistake.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log10
 
@@ -19,6 +19,7 @@ from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .recording import PHASES, Recording
+from .scales import current_scales, largest
 
 FUNDAMENTAL = 24.0 / np.pi**2 * np.sin(np.pi / 6.0)  # of the trapezoid with slopes of 60 degrees
 KNOWN = 0.05  # relative standard error below which a coefficient can refuse a recording
@@ -31,6 +32,7 @@ UNBALANCED = 0.35  # of the currents' size, that their sum may be
 OFFSET = 0.05  # of the supply, that a voltage may be off by at rest
 CERTAIN = 6.0  # standard errors
 FROZEN_TURNS, FROZEN = 4.0 * np.pi, 0.05  # electrical rad and s, through which a channel of a phase must change
+FINE = 3.0  # steps of its resolution, by which samples of a channel differ that cannot stay the same by chance
 LATE = 4  # column of the voltage equation
 LATEST = 5.0  # intervals that the angle may be late by
 MOST_POLE_PAIRS = 20  # that are tried where those told do not turn with the voltages
@@ -81,25 +83,54 @@ def carried_actuator(recording: Recording) -> Mapping[str, float]:
 
 
 def refuse_frozen(path: str, recording: Recording, actuator: ActuatorParameters) -> None:
-    """Refuse a voltage or current of a phase that stays the same through turns of the field.
+    """Refuse a channel that stays the same while the rotor turns.
+
+    A voltage or current of a phase changes within turns of the field; any other channel must where its samples
+    otherwise differ by noise that is finer resolved than it is large. A speed that stays at its extreme clips.
 
     Raises
     ------
     InputError : naming the channel and from when to when
     """
     turned = actuator.pole_pairs * np.abs(np.diff(recording.rotor_angle, prepend=recording.rotor_angle[:1])).cumsum()
+    by_speed = actuator.pole_pairs * recording.interval * np.abs(recording.rotor_speed).cumsum()
     for variable in ("phase_voltage", "phase_current"):
         for j, values in enumerate(getattr(recording, variable).T):
-            ends = np.append(np.flatnonzero(np.diff(values) != 0.0), len(values) - 1)
-            starts = np.append(0, ends[:-1] + 1)
-            long = (turned[ends] - turned[starts] > FROZEN_TURNS) & ((ends - starts) * recording.interval > FROZEN)
-            if long.any():
-                k = int(np.argmax(long))
-                raise InputError(
-                    f"{path}: {variable} of phase {PHASES[j]} stays at {values[starts[k]]:.4g} from "
-                    f"{recording.time[starts[k]]:.3g} to {recording.time[ends[k]]:.3g} s while the rotor turns; the "
-                    "channel is frozen"
-                )
+            _refuse_constant(path, f"{variable} of phase {PHASES[j]}", values, turned, recording)
+    for variable in ("rotor_speed", "rotor_angle", "output_position", "bus_voltage"):
+        values = getattr(recording, variable)
+        if values is None or not (_fine(values) or (variable == "rotor_angle" and np.ptp(values) == 0.0)):
+            continue
+        clips = (values.min(), values.max()) if variable == "rotor_speed" else ()
+        _refuse_constant(path, variable, values, by_speed if variable == "rotor_angle" else turned, recording, clips)
+
+
+def _fine(values: np.ndarray) -> bool:
+    """Whether samples differ by several steps of their resolution, so that they do not stay the same by chance."""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0.0]
+    return len(steps) >= FEWEST and float(np.median(steps)) > FINE * float(np.quantile(steps, 0.01))
+
+
+def _refuse_constant(
+    path: str,
+    what: str,
+    values: np.ndarray,
+    turned: np.ndarray,
+    recording: Recording,
+    but: Sequence[float] = (),
+) -> None:
+    """Refuse values (sample,) that stay the same, other than ``but``, through turns of the field, ``turned`` (rad)."""
+    ends = np.append(np.flatnonzero(np.diff(values) != 0.0), len(values) - 1)
+    starts = np.append(0, ends[:-1] + 1)
+    long = (turned[ends] - turned[starts] > FROZEN_TURNS) & ((ends - starts) * recording.interval > FROZEN)
+    long &= ~np.isin(values[starts], but)
+    if long.any():
+        k = int(np.argmax(long))
+        raise InputError(
+            f"{path}: {what} stays at {values[starts[k]]:.4g} from {recording.time[starts[k]]:.3g} to "
+            f"{recording.time[ends[k]]:.3g} s while the rotor turns; the channel is frozen"
+        )
 
 
 def refuse_unbalanced(path: str, recording: Recording) -> None:
@@ -107,24 +138,20 @@ def refuse_unbalanced(path: str, recording: Recording) -> None:
 
     Raises
     ------
-    InputError : the currents' sum is a third of their size
+    InputError : the currents' sum is a third of their size, or one has a scale that no sensor has
     """
     i = recording.phase_current
     size = float(np.median(np.abs(i).sum(axis=1)))
     left = float(np.median(np.abs(i.sum(axis=1)))) / max(size, 1e-12)
-    if left <= UNBALANCED:
+    scales = current_scales(recording)
+    j = int(np.argmax([abs(scale.off) for scale in scales]))
+    scale = scales[j]
+    mistaken = abs(scale.off) > largest("current_gain", f"g_{PHASES[j]}")
+    if left <= UNBALANCED and not mistaken:
         return
-    readings = {}
-    for j in range(3):
-        others = np.delete(i, j, axis=1).sum(axis=1)
-        gain, offset = np.polyfit(i[:, j], -others, 1) if np.ptp(i[:, j]) > 0.0 else (1.0, 0.0)
-        rest = float(np.median(np.abs(others + gain * i[:, j] + offset)))
-        readings[j] = rest, float(gain), float(offset)
-    j = min(readings, key=lambda j: readings[j][0])
-    _, gain, offset = readings[j]
-    text = f"their offset is {-offset:.3g} A in all"
-    if abs(gain - 1.0) > 0.3:
-        wrong = "the wrong sign" if gain < 0.0 else f"{1.0 / gain:.3g} times its size"
+    text = f"their offset is {i.sum(axis=1).mean():.3g} A in all"
+    if mistaken:
+        wrong = "the wrong sign" if scale.value < 0.0 else f"{scale.value:.3g} times its size"
         text = f"phase {PHASES[j]} has {wrong}"
     raise InputError(
         f"{path}: phase_current of a, b, c add up to {100.0 * left:.0f} % of their size, accepted is next to nothing; "

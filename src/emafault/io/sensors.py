@@ -11,6 +11,7 @@ from ..errors import InputError
 from .command import refuse_unfollowed
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
+from .scales import largest, speed_scale
 
 SLOWEST_INTERVAL = 1e-3  # s
 LEAST_TRAVEL = 0.1  # rad of the rotor; less is standing still
@@ -58,6 +59,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         by_speed = np.cumsum(recording.rotor_speed) * recording.interval
         if not _follows(theta, by_speed)[0] and not _alike_but_for_drift(theta, by_speed, recording.interval):
             _refuse_unlike(path, "rotor_speed", "the rate of rotor_angle", theta, by_speed)
+        _refuse_speed(path, recording)
     if travel > 5.0:
         by_shaft = actuator.gear_ratio * (recording.output_position - recording.output_position[0])
         _refuse_unlike(
@@ -116,6 +118,16 @@ def _refuse_unlike(
         raise InputError(
             f"{path}: {variable} is not {what} (slope {slope:.2g}, correlation {likeness:.2f}); "
             "sensors, units or signs are mistaken"
+        )
+
+
+def _refuse_speed(path: str, recording: Recording) -> None:
+    """Refuse a speed with another scale than any sensor of it has."""
+    scale, most = speed_scale(recording), largest("speed_scale", "scale")
+    if abs(scale.off) > most:
+        raise InputError(
+            f"{path}: rotor_speed is {scale.value:.3g} times the rate of rotor_angle, accepted is {1.0 - most:g} to "
+            f"{1.0 + most:g}; the unit or scale of one of them is mistaken"
         )
 
 
@@ -211,8 +223,14 @@ def useless(recording: Recording, actuator: ActuatorParameters):
     at = float(np.median(recording.output_position[:3]))
     if abs(at) > START_POSITION:
         yield "output_position", f"is {at:.3g} rad at the start; a recording starts at zero"
+    yield from broken(recording)
+
+
+def broken(recording: Recording):
+    """Yield (variable, rule) for channels that do not show through most of a motion, or all of it, what they should."""
     yield from clipped(recording)
-    stuck = _longest_constant(theta, np.abs(recording.rotor_speed) > 10.0)
+    dt = recording.interval
+    stuck = _longest_constant(recording.rotor_angle, np.abs(recording.rotor_speed) > 10.0)
     if stuck * dt > 5e-3 and stuck > 10:
         yield "rotor_angle", f"stays exactly the same for {1e3 * stuck * dt:.0f} ms while the rotor turns"
 
