@@ -8,7 +8,7 @@ import pytest
 from emafault.errors import InputError
 from emafault.io.bench import check_bench, read_bench
 from emafault.io.recording import write_recording
-from emafault.io.sensors import cut_off, refuse_mistaken
+from emafault.io.sensors import clipped, cut_off, refuse_mistaken
 
 SWAPPED = [1, 0, 2]
 CYCLED = [1, 2, 0]
@@ -152,6 +152,13 @@ def test_a_coarsely_truncated_speed_is_no_mistaken_sensor_but_a_wrong_sign_or_un
     for wrong in (-speed, speed * 30.0 / np.pi):
         with pytest.raises(InputError, match="rotor_speed"):
             refuse_mistaken(NAME, replace(slow, rotor_speed=wrong), shop.actuator)
+
+
+def test_a_coarse_speed_that_is_zero_in_a_slow_motion_does_not_clip(plain, shop):
+    ramp = plain["recording_1.nc"]
+    slow = replace(ramp, rotor_speed=np.minimum(5.0 * np.trunc((ramp.rotor_speed + 120.0) / 5.0), 0.0))
+    assert (slow.rotor_speed == 0.0).sum() > 8
+    assert not [rule for _, rule in clipped(slow) if "0 rad/s" in rule]
 
 
 def _with(shop, **factors):

@@ -249,7 +249,7 @@ def clipped(recording: Recording):
     for extreme in (np.max, np.min):
         level, count, _ = _at_extreme(recording.rotor_speed[moving], extreme)
         beyond = np.abs(w[moving][recording.rotor_speed[moving] == level]) - abs(level)
-        if count >= CLIPPED_SPEED and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
+        if abs(level) > 1e-9 and count >= CLIPPED_SPEED and np.mean(beyond > 0.02 * abs(level) + 1.0) > 0.5:
             yield "rotor_speed", f"clips: {level:.4g} rad/s in {count} samples while the rotor turns faster"
 
 
