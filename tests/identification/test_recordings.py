@@ -10,6 +10,7 @@ from emafault.dataset import simulate_blocks, simulate_recording
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES
 from emafault.identification.fitting import Prior, TrainingRows, fit_identifier
+from emafault.identification.possible import doubts
 from emafault.identification.recordings import Model, identify_recordings
 from emafault.reconstruction import join_features, reconstruct
 
@@ -84,3 +85,71 @@ def test_a_command_that_the_output_does_not_follow_is_refused_as_by_a_diagnosis(
         identify_recordings(models["weighted"], [wrong])
     with pytest.raises(InputError, match=f"^r.nc: commanded_position .*{says}"):
         identify_recordings(models["weighted"], [plain], [wrong])
+
+
+def gained(recording, **factors):
+    """A recording with channels times factors; ``ib`` is the current of phase b, ends included."""
+    out = {}
+    for name, factor in factors.items():
+        names = ("phase_current", "phase_current_end") if name == "ib" else (name,)
+        out |= {n: getattr(recording, n) * ([1.0, factor, 1.0] if name == "ib" else factor) for n in names}
+    return replace(recording, name="r.nc", attributes={}, **out)
+
+
+SCALES = {
+    "rotor_speed": "rotor_speed is 1.05 times the rate of rotor_angle",
+    "ib": "phase_current of phase b is 1.05 times what adds up to zero with the other two",
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("channel", SCALES)
+def test_a_scale_that_the_recording_itself_tells_is_told_and_widens_the_intervals(models, channel, method):
+    straight, off = (
+        identify_recordings(models[method], [gained(simulated(), **{channel: factor})]) for factor in (1.0, 1.05)
+    )
+    assert " times " not in straight.notes[0]
+    assert SCALES[channel] in off.notes[0] and off.notes[0].count(" times ") == 1
+    wider = np.max(widths(off.estimates[0]) / widths(straight.estimates[0]))
+    assert wider > (1.1 if method == "paper" else 5.0)  # whose own are as wide as a quarter of the turns
+    if method != "paper":
+        assert all(e["low"] < truth < e["high"] for e, truth in zip(off.estimates[0].values(), FAULT))
+
+
+@pytest.mark.parametrize("channel", SCALES)
+def test_a_scale_that_no_sensor_has_is_refused_unless_healthy_recordings_have_it_too(models, channel):
+    model = models["weighted"]
+    off = gained(simulated(), **{channel: 1.13})
+    with pytest.raises(InputError, match=r"^r.nc: .* is 1.13 times .* accepted is 0.9 to 1.1.*--reference calibrates"):
+        identify_recordings(model, [off])
+    healthy = simulated(fault=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 10.0]))
+    found = identify_recordings(model, [off], [gained(healthy, **{channel: 1.13})])
+    assert " times " not in found.notes[0]
+    assert found.estimates[0]["Na"]["value"] == pytest.approx(FAULT[0], abs=0.01)
+
+
+def test_turns_below_zero_are_told_and_refused_where_no_unit_looks_like_them(models):
+    healthy = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 10.0])
+    within, little = (
+        identify_recordings(models["weighted"], [gained(simulated(fault=healthy), phase_voltage=f)])
+        for f in (1.01, 1.05)
+    )
+    assert "share of shorted turns" not in within.notes[0]  # two of a unit's standard deviations
+    assert "Na is -0.05" in little.notes[0] and "--reference calibrates" in little.notes[0]
+    with pytest.raises(InputError, match=r"^r.nc: Na would be -0.2.*share of shorted turns is not negative"):
+        identify_recordings(models["weighted"], [gained(simulated(fault=healthy), phase_voltage=1.2)])
+
+
+def test_an_eccentricity_beyond_the_gap_is_refused():
+    of = {"Na": 0.0, "Nb": 0.0, "Nc": 0.0, "xi_x": 0.8, "xi_y": -0.8, "dT": 0.0}
+    wide = {n: {"value": v, "low": v - 0.5, "high": v + 0.5} for n, v in of.items()}
+    with pytest.raises(InputError, match=r"^r.nc: xi_x and xi_y would be 1.13 together, at 1 the rotor touches"):
+        doubts("r.nc", wide, 0.0, 0.9)
+    assert doubts("r.nc", wide | {"xi_y": wide["Na"]}, 0.0, 0.9) == []
+
+
+def test_a_speed_that_stops_changing_at_its_extreme_is_refused(models):
+    plain = simulated()
+    speed = np.minimum(plain.rotor_speed, 0.6 * plain.rotor_speed.max())
+    with pytest.raises(InputError, match="rotor_speed clips"):
+        identify_recordings(models["weighted"], [replace(plain, rotor_speed=speed)])

@@ -10,17 +10,17 @@ from scipy.special import chdtri, ndtri
 from ..errors import InputError
 from ..faults import FAULT_NAMES
 from ..io.recording import PHASES, Recording
-from ..io.sensors import refuse_mistaken
+from ..io.sensors import broken, refuse_mistaken
 from ..reconstruction import Features, join_features
 from ..reconstruction.calibration import calibrate, reconstruct_recordings
 from .identifier import Identifier
+from .possible import doubts
 from .posterior import CHANCE
+from .scales import beside, in_words, scales_of, widened_estimate, widened_noise
 from .together import together
 
-#: what a fault vector's components can be of any machine, a unit off nominal allowed for
-POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
-WARMTH, LARGEST_WARMTH = 30.0, 150.0  # K from the soak temperature, that are told, and that nothing explains
-#: relative error of R, k and L beside their noise up to which intervals are widened; beyond it nothing is identified
+#: relative error of R, k and L beside their noise, and of a sensor's scale, up to which intervals are widened; beyond
+#: it nothing is identified
 LARGEST_MODEL_ERROR = 0.1
 
 
@@ -70,6 +70,11 @@ def identify_recordings(
             raise InputError(f"{recording.name}: has health 'seeded', a reference must be healthy")
     for recording in (*recordings, *reference):
         refuse_mistaken(recording.name, recording, identifier.actuator)
+        for variable, rule in broken(recording):
+            raise InputError(f"{recording.name}: {variable} {rule}")
+    of_reference = [scales_of(r) for r in reference]
+    scales = [beside(scales_of(r), of_reference) for r in recordings]
+    of_scales = [in_words(r.name, own, LARGEST_MODEL_ERROR) for r, own in zip(recordings, scales, strict=True)]
     features = [reconstruct_recordings([r], model.method, identifier.actuator, model.settings) for r in recordings]
     for recording, own in zip(recordings, features):
         if not np.all(own.identified):
@@ -87,14 +92,21 @@ def identify_recordings(
     estimates: list[dict[str, dict[str, float]]] = []
     notes: list[list[str]] = []
     told: list[np.ndarray | None] = []
-    for recording, own in zip(recordings, features, strict=True):
+    for n, (recording, own) in enumerate(zip(recordings, features, strict=True)):
         inputs, noise = own.inputs, own.inputs_covariance if np.all(np.isfinite(own.inputs_covariance)) else None
         unexplained, said = _unexplained(recording, own, identifier)
-        noise, more = _with_misfit(recording.name, own, noise, unexplained, identifier, unit, covariance)
-        said += more + of_unit
+        if noise is not None:
+            # Cauchy and Schwarz: a misfit of chi-squared x beyond noise moves no estimate by more than x^0.5 of its
+            # errors
+            noise = widened_noise(noise * (1.0 + unexplained), inputs, scales[n])
+        noise, more = _with_misfit(recording.name, own, noise, identifier, unit, covariance)
+        said += of_scales[n] + more + of_unit
         if not as_one:
             (estimate,) = identifier.estimate(inputs, level, noise, unit, covariance)
-            estimates.append(estimate if noise is not None else _widened(estimate, unexplained))
+            if noise is None:
+                estimate = _widened(estimate, unexplained)
+                estimate = widened_estimate(estimate, identifier, inputs, scales[n], level, unit)
+            estimates.append(estimate)
         told.append(noise)
         beyond = float(identifier.outside(inputs, unit)[0])
         if beyond > 0.05:
@@ -103,8 +115,8 @@ def identify_recordings(
     if as_one:
         estimates = _as_one(model, recordings, features, told, unit, covariance, level)
     for recording, estimate, said in zip(recordings, estimates, notes, strict=True):
-        _refuse_impossible(recording.name, estimate)
-        said[:0] = _beside_ambient(recording, estimate, identifier)
+        soaked = recording.ambient_temperature - identifier.actuator.reference_temperature
+        said[:0] = doubts(recording.name, estimate, soaked, level)
     return Identified(estimates, ["; ".join(said) for said in notes])
 
 
@@ -214,12 +226,11 @@ def _with_misfit(
     name: str,
     own: Features,
     noise: np.ndarray | None,
-    unexplained: float,
     identifier: Identifier,
     unit: np.ndarray | None,
     unit_covariance: np.ndarray | None,
 ) -> tuple[np.ndarray | None, list[str]]:
-    """Covariance of a recording's features with what its equations and laws leave unexplained, and the laws' in words.
+    """Covariance of a recording's features with what the fault laws leave unexplained, and that in words.
 
     Raises
     ------
@@ -227,8 +238,6 @@ def _with_misfit(
     """
     if noise is None:
         return noise, []
-    # Cauchy and Schwarz: a misfit of chi-squared x beyond noise moves no estimate by more than x^0.5 of its errors
-    noise = noise * (1.0 + unexplained)
     off = float(identifier.model_error(own.inputs, noise, unit, unit_covariance)[0])
     if off > LARGEST_MODEL_ERROR:
         raise InputError(
@@ -239,35 +248,3 @@ def _with_misfit(
         return noise, []
     noise = noise + np.eye(9) * (off * own.inputs) ** 2
     return noise, [f"R, k and L fit no fault of this unit by {off:.2g} of their values: intervals are widened"]
-
-
-def _beside_ambient(
-    recording: Recording, estimate: Mapping[str, Mapping[str, float]], identifier: Identifier
-) -> list[str]:
-    """What the winding's temperature is above that it was soaked at, in words where it is far.
-
-    Raises
-    ------
-    InputError : further than any unit within commercial tolerances would look
-    """
-    soaked = recording.ambient_temperature - identifier.actuator.reference_temperature
-    above = estimate["dT"]["value"] - soaked
-    if abs(above) > LARGEST_WARMTH:
-        raise InputError(
-            f"{recording.name}: dT would be {estimate['dT']['value']:.4g} K where it was soaked at {soaked:.4g} K; its "
-            "sensors or ambient_temperature are mistaken, or it is of another actuator"
-        )
-    if abs(above) > WARMTH:
-        return [f"dT lies {above:.0f} K from the soak temperature: the unit is off nominal, --reference calibrates it"]
-    return []
-
-
-def _refuse_impossible(name: str, estimate: Mapping[str, Mapping[str, float]]) -> None:
-    for component, found in estimate.items():
-        low, high = POSSIBLE[component if component == "dT" else "N" if component.startswith("N") else "xi"]
-        if not low <= found["value"] <= high:
-            units = " K" if component == "dT" else ""
-            raise InputError(
-                f"{name}: {component} would be {found['value']:.4g}{units}, possible is {low:g} to {high:g}{units}; "
-                "the recording's units, signs or phases are mistaken, or it is of another actuator"
-            )
