@@ -16,12 +16,12 @@ def scaled(name, factor):
     return lambda r: replace(r, **{n: getattr(r, n) * factor for n in (name, f"{name}_end") if hasattr(r, n)})
 
 
-def frozen(name, j=...):
-    """A channel that stays the same from a third of the recording to two thirds."""
+def frozen(name, j=..., of=3):
+    """A channel that stays the same but for the first and the last of so many parts."""
 
     def change(r):
-        x, third = getattr(r, name).copy(), len(r.time) // 3
-        x[third : 2 * third, j] = x[third, j]
+        x, part = getattr(r, name).copy(), len(r.time) // of
+        x[part:-part, j] = x[part, j]
         return replace(r, **{name: x})
 
     return change
@@ -45,11 +45,11 @@ MISTAKES = {
     ),
     "a voltage frozen": (frozen("phase_voltage", 1), ("phase_voltage of phase b stays at", "frozen")),
     "a current frozen": (frozen("phase_current", 2), ("phase_current of phase c stays at", "frozen")),
-    "speed frozen": (frozen("rotor_speed"), ("rotor_speed stays at", "frozen")),
-    "angle frozen": (frozen("rotor_angle"), ("rotor_angle stays at", "frozen")),
+    "speed frozen": (frozen("rotor_speed", of=10), ("rotor_speed stays at", "frozen")),
+    "angle frozen": (frozen("rotor_angle", of=10), ("rotor_angle stays at", "frozen")),
     "angle dead": (lambda r: replace(r, rotor_angle=0.0 * r.rotor_angle), ("rotor_angle stays at 0", "frozen")),
-    "output frozen": (frozen("output_position"), ("output_position stays at", "frozen")),
-    "bus frozen": (frozen("bus_voltage"), ("bus_voltage stays at", "frozen")),
+    "output frozen": (frozen("output_position", of=10), ("output_position stays at", "frozen")),
+    "bus frozen": (frozen("bus_voltage", of=10), ("bus_voltage stays at", "frozen")),
     "speed half as fast again": (scaled("rotor_speed", 1.5), ("rotor_speed is 1.5 times", "accepted is 0.8 to 1.2")),
     "speed of 3 pole pairs for 4": (scaled("rotor_speed", 0.75), ("rotor_speed is 0.75 times", "accepted is 0.8")),
     "a current half as large again": (scaled("phase_current", [1, 1.5, 1]), ("phase b has 1.5 times its size",)),
@@ -97,6 +97,11 @@ def test_scales_that_a_diagnosis_names_or_describes_are_no_mistakes(plain, shop,
     for r in plain.values():
         for change in (scaled("rotor_speed", factor), scaled("phase_current", [1, factor, 1])):
             refuse_mistaken("r.nc", change(r), shop.actuator)
+
+
+@pytest.mark.parametrize("name", ["rotor_speed", "bus_voltage"])
+def test_what_is_held_for_a_while_is_left_to_a_diagnosis(plain, shop, name):
+    refuse_mistaken("r.nc", frozen(name)(plain["recording_0.nc"]), shop.actuator)
 
 
 def test_a_coarse_channel_may_stay_the_same(plain, shop):

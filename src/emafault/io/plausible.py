@@ -86,7 +86,8 @@ def refuse_frozen(path: str, recording: Recording, actuator: ActuatorParameters)
     """Refuse a channel that stays the same while the rotor turns.
 
     A voltage or current of a phase changes within turns of the field; any other channel must where its samples
-    otherwise differ by noise that is finer resolved than it is large. A speed that stays at its extreme clips.
+    otherwise differ by noise that is finer resolved than it is large, for most of the motion: what is held for less is
+    left out of a diagnosis and told. A speed that stays at its extreme clips.
 
     Raises
     ------
@@ -102,7 +103,8 @@ def refuse_frozen(path: str, recording: Recording, actuator: ActuatorParameters)
         if values is None or not (_fine(values) or (variable == "rotor_angle" and np.ptp(values) == 0.0)):
             continue
         clips = (values.min(), values.max()) if variable == "rotor_speed" else ()
-        _refuse_constant(path, variable, values, by_speed if variable == "rotor_angle" else turned, recording, clips)
+        way = by_speed if variable == "rotor_angle" else turned
+        _refuse_constant(path, variable, values, way, recording, clips, least=0.5 * float(way[-1]))
 
 
 def _fine(values: np.ndarray) -> bool:
@@ -119,11 +121,13 @@ def _refuse_constant(
     turned: np.ndarray,
     recording: Recording,
     but: Sequence[float] = (),
+    least: float = FROZEN_TURNS,
 ) -> None:
-    """Refuse values (sample,) that stay the same, other than ``but``, through turns of the field, ``turned`` (rad)."""
+    """Refuse values (sample,) that stay the same, other than ``but``, through turns of the field, ``turned`` (rad), of
+    at least so many."""
     ends = np.append(np.flatnonzero(np.diff(values) != 0.0), len(values) - 1)
     starts = np.append(0, ends[:-1] + 1)
-    long = (turned[ends] - turned[starts] > FROZEN_TURNS) & ((ends - starts) * recording.interval > FROZEN)
+    long = (turned[ends] - turned[starts] > max(least, FROZEN_TURNS)) & ((ends - starts) * recording.interval > FROZEN)
     long &= ~np.isin(values[starts], but)
     if long.any():
         k = int(np.argmax(long))
