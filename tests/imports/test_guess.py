@@ -38,6 +38,34 @@ def test_channels_are_told_by_names_and_units(names, writer, fine, tmp_path):
     assert signals["phase_voltage"]["reference"] == "???" and ("unit" in signals["rotor_angle"]) == (writer is mat)
 
 
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("Motor Efficiency", "%"), ("Motor Efficiency", ""), ("Frequency", ""), ("Rectangle", ""), ("Mode offset", ""),
+        ("Route", ""), ("Output power", "W"), ("Set temperature", "degC"), ("Shaft torque", "N*m"),
+    ],
+)  # fmt: skip
+def test_a_word_that_only_holds_a_stem_or_has_another_unit_leaves_the_blank(name, unit, tmp_path):
+    content = f"time [s],{name}{f' [{unit}]' if unit else ''}\n0,1\n0.1,2\n"
+    (tmp_path / "log.csv").write_text(content)
+    signals = yaml.safe_load(guess([tmp_path / "log.csv"], tmp_path))["signals"]
+    for signal in ("rotor_angle", "output_position", "commanded_position"):
+        assert signals[signal]["channel"] == "???", signal
+    assert "rotor_speed" not in signals and "bus_voltage" not in signals
+
+
+@pytest.mark.parametrize("name", ["RotorAngle", "motorangle", "enc_count", "EncoderPos1", "theta_m", "Resolver"])
+def test_the_rotor_s_angle_is_known_by_its_words(name, tmp_path):
+    (tmp_path / "log.csv").write_text(f"time [s],{name}\n0,1\n0.1,2\n")
+    assert yaml.safe_load(guess([tmp_path / "log.csv"], tmp_path))["signals"]["rotor_angle"]["channel"] == name
+
+
+def test_a_commanded_speed_is_not_the_speed(tmp_path):
+    (tmp_path / "log.csv").write_text("time [s],Speed ref [rpm],Motor speed [rpm]\n0,1,1\n0.1,2,2\n")
+    signals = yaml.safe_load(guess([tmp_path / "log.csv"], tmp_path))["signals"]
+    assert signals["rotor_speed"]["channel"] == "Motor speed"
+
+
 def test_a_guessed_map_is_refused_until_it_is_filled_in_and_then_imports(fine, tmp_path, capsys):
     csv(tmp_path / "log.csv", log(fine))
     where = tmp_path / "map.yaml"

@@ -83,8 +83,16 @@ def mf4(path, log):
         file.save(path, overwrite=True)
 
 
+def _in_threes(log):
+    """Yield name of a topic, and (sample, 3) values of three channels, the last filled up with the first ones."""
+    names = list(log.channels)
+    for at in range(0, len(names), 3):
+        three = (names[at : at + 3] + names[:2])[:3]
+        yield f"/{'_'.join(three)}", np.column_stack([log.channels[name] for name in three])
+
+
 def bag(path, log):
-    """One topic a channel, of stamped numbers."""
+    """Of ROS 2: stamped points, each of three channels."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -92,16 +100,31 @@ def bag(path, log):
     kinds = store.types
     stamped, stamp = kinds["geometry_msgs/msg/PointStamped"], kinds["builtin_interfaces/msg/Time"]
     header, point = kinds["std_msgs/msg/Header"], kinds["geometry_msgs/msg/Point"]
-    names = list(log.channels)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as file:
-        for at in range(0, len(names), 3):
-            three = (names[at : at + 3] + names[:2])[:3]
-            topic = file.add_connection(f"/{'_'.join(three)}", stamped.__msgtype__, typestore=store)
-            for k, t in enumerate(np.round(log.time * 1e9).astype(int)):
+        for name, values in _in_threes(log):
+            topic = file.add_connection(name, stamped.__msgtype__, typestore=store)
+            for t, xyz in zip(np.round(log.time * 1e9).astype(int), values.tolist(), strict=True):
                 seconds, nanoseconds = divmod(int(t) + 10**9, 10**9)
-                x, y, z = (float(log.channels[name][k]) for name in three)
-                message = stamped(header(stamp(seconds, nanoseconds), ""), point(x, y, z))
+                message = stamped(header(stamp(seconds, nanoseconds), ""), point(*xyz))
                 file.write(topic, int(t) + 10**9, store.serialize_cdr(message, stamped.__msgtype__))
+
+
+def bag_1(path, log):
+    """Of ROS 1: the same, in one file."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kinds = store.types
+    stamped, stamp = kinds["geometry_msgs/msg/PointStamped"], kinds["builtin_interfaces/msg/Time"]
+    header, point = kinds["std_msgs/msg/Header"], kinds["geometry_msgs/msg/Point"]
+    with Writer(path) as file:
+        for name, values in _in_threes(log):
+            topic = file.add_connection(name, stamped.__msgtype__, typestore=store)
+            for k, (t, xyz) in enumerate(zip(np.round(log.time * 1e9).astype(int), values.tolist(), strict=True)):
+                seconds, nanoseconds = divmod(int(t) + 10**9, 10**9)
+                message = stamped(header(k, stamp(seconds, nanoseconds), ""), point(*xyz))
+                file.write(topic, int(t) + 10**9, store.serialize_ros1(message, stamped.__msgtype__))
 
 
 def netcdf(path, log):
@@ -130,18 +153,18 @@ def npz(path, log):
 WRITERS = {
     "plain.csv": csv, "european.csv": european_csv, "oscilloscope.csv": oscilloscope_csv, "counted.csv": counted_csv,
     "log.tsv": tsv, "log.parquet": parquet, "v5.mat": mat, "v73.mat": mat_73, "log.tdms": tdms, "log.mf4": mf4,
-    "bag": bag, "log.nc": netcdf, "log.h5": hdf5, "packed.csv.gz": csv, "log.npz": npz,
+    "bag": bag, "one.bag": bag_1, "log.nc": netcdf, "log.h5": hdf5, "packed.csv.gz": csv, "log.npz": npz,
 }  # fmt: skip
 #: files -> name of a channel in them, where it is not that of the log
 NAMED = {
     "v5.mat": "log/{}", "v73.mat": "log/{}", "log.tdms": "daq/{}", "log.h5": "daq/{}",
 }  # fmt: skip
-WITHOUT_UNITS = ("v5.mat", "v73.mat", "bag", "log.npz")
+WITHOUT_UNITS = ("v5.mat", "v73.mat", "bag", "one.bag", "log.npz")
 
 
 def channel(file, name, names):
     """Name of a log's channel in a file."""
-    if file == "bag":
+    if file.endswith("bag"):
         at = names.index(name)
         three = (names[at - at % 3 : at - at % 3 + 3] + names[:2])[:3]
         return f"/{'_'.join(three)}/point.{'xyz'[at % 3]}"

@@ -14,7 +14,7 @@ from .readers import read_raw
 HEADER = """\
 # Guessed from the names and units of channels: look it over, and fill in every ??? .
 # reference: star, dc_minus, virtual_star, line_to_line or duty; health: healthy, unknown or seeded;
-# ambient: soak temperature before the motion, as 21.5 degC. samples: instants, or means over each sample's step.
+# ambient: winding temperature at the start, as 21.5 degC. samples: instants, or means over each sample's step.
 """
 _PHASE = {
     "a": 0,
@@ -35,13 +35,15 @@ _PHASE = {
 }
 #: units where a file has none; decades are found by the import, a speed's unit altogether
 _USUAL = {"phase_voltage": "V", "phase_current": "A", "phase_current_end": "A", "bus_voltage": "V"}
-_BUS = re.compile(r"bus|dc|batt|supply|link", re.IGNORECASE)
-_COMMAND = re.compile(r"cmd|command|ref|soll|set|target|demand", re.IGNORECASE)
-_OUTPUT = re.compile(r"out|shaft|load|lvdt|surface|flap|user|position", re.IGNORECASE)
-_END = re.compile(r"end|inst", re.IGNORECASE)
-_VOLTS, _AMPS, _DUTY = (re.compile(x, re.IGNORECASE) for x in (r"volt|^[uv]", r"curr|amp|^i", r"duty|pwm"))
-_SPEED = re.compile(r"speed|rpm|omega|veloc|drehzahl", re.IGNORECASE)
-_HALL = re.compile(r"hall", re.IGNORECASE)
+# short stems begin or are a word: "enc" is no part of "Efficiency"
+_BUS = re.compile(r"\b[uv]?(bus|dc|batt|supply|link)")
+_COMMAND = re.compile(r"\b(cmd|ref|reference|set|setpoint)\b|\bsoll|command|target|demand")
+_OUTPUT = re.compile(r"\b(out|output|load|user)\b|\bout ?pos|shaft|lvdt|surface|flap|position")
+_ANGLE = re.compile(r"\b(rotor|motor)?angle\b|theta|\b(enc|encoder|resolver)\b")
+_END = re.compile(r"\b(end|inst)")
+_VOLTS, _AMPS, _DUTY = (re.compile(x) for x in (r"volt|^[uv]", r"curr|\bamp|^i", r"\bduty|\bpwm"))
+_SPEED = re.compile(r"speed|rpm\b|omega|veloc|drehzahl")
+_HALL = re.compile(r"\bhall")
 
 
 def guess(paths: Sequence[str | Path], folder: Path) -> str:
@@ -72,17 +74,20 @@ def _beside(path: Path, folder: Path) -> str:
 
 
 def _kind(unit: str) -> str:
-    """What a unit is of: V, A, speed, angle or nothing."""
+    """What a unit is of: V, A, speed, angle, length, or nothing where it does not say; "other" is of none of these."""
     if not unit:
         return ""
     try:
         found = registry().Quantity(1.0, spelt(unit))
     except Exception:  # pint raises many kinds for text that is no unit
         return ""
-    for kind, wanted in (("V", "volt"), ("A", "ampere"), ("speed", "rad/s"), ("angle", "rad")):
-        if found.dimensionality == registry().Quantity(1.0, wanted).dimensionality and not found.check("1"):
+    if found.check("1"):
+        angles = ("rad", "deg", "degree", "degrees", "turn", "mrad", "rev")
+        return "angle" if spelt(unit) in angles else "other" if unit.strip() == "%" else ""
+    for kind, wanted in (("V", "volt"), ("A", "ampere"), ("speed", "rad/s"), ("length", "m")):
+        if found.dimensionality == registry().Quantity(1.0, wanted).dimensionality:
             return kind
-    return "angle" if spelt(unit) in ("rad", "deg", "degree", "degrees", "turn", "mrad", "rev") else ""
+    return "other"
 
 
 def _signals(channels: dict[str, tuple[str, str]]) -> dict:
@@ -94,27 +99,29 @@ def _signals(channels: dict[str, tuple[str, str]]) -> dict:
     single: dict[str, str] = {}
     for name, (kind, _) in channels.items():
         bare = name.split("/")[-1]
-        phase = _phase_of(bare)
-        if _HALL.search(bare):
+        words, phase = _words(bare), _phase_of(bare)
+        if _HALL.search(words):
             halls.append(name)
-        elif _DUTY.search(bare) and phase is not None:
+        elif _DUTY.search(words) and phase is not None:
             duty[phase] = name
-        elif not kind and _BUS.search(bare):
+        elif kind == "other" or (kind in ("V", "A", "speed") and _COMMAND.search(words)):
+            continue  # no signal of the map
+        elif not kind and _BUS.search(words):
             single.setdefault("bus_voltage", name)
-        elif kind == "V" or (not kind and _VOLTS.search(bare) and not _SPEED.search(bare)):
-            if _BUS.search(bare) or phase is None:
+        elif kind == "V" or (not kind and _VOLTS.search(words) and not _SPEED.search(words)):
+            if _BUS.search(words) or phase is None:
                 single.setdefault("bus_voltage", name)
             else:
                 volts[phase] = name
-        elif (kind == "A" or (not kind and _AMPS.search(bare))) and phase is not None:
-            (ends if _END.search(bare) else amps)[phase] = name
-        elif kind == "speed" or _SPEED.search(bare):
+        elif (kind == "A" or (not kind and _AMPS.search(words))) and phase is not None:
+            (ends if _END.search(words) else amps)[phase] = name
+        elif kind == "speed" or _SPEED.search(words):
             single.setdefault("rotor_speed", name)
-        elif _COMMAND.search(bare):
+        elif _COMMAND.search(words):
             single.setdefault("commanded_position", name)
-        elif _OUTPUT.search(bare):
+        elif _OUTPUT.search(words):
             single.setdefault("output_position", name)
-        elif kind == "angle" or re.search(r"angle|theta|enc", bare, re.IGNORECASE):
+        elif kind == "angle" or _ANGLE.search(words):
             single.setdefault("rotor_angle", name)
     by_duty = None in volts and None not in duty
     voltage = {"reference": "duty" if by_duty else BLANK, "channels": _or_blank(duty if by_duty else volts)}
@@ -139,6 +146,12 @@ def _signals(channels: dict[str, tuple[str, str]]) -> dict:
 
 def _or_blank(names: list) -> list:
     return [BLANK if n is None else n for n in names]
+
+
+def _words(name: str) -> str:
+    """A name as words with spaces between: ``RotorAngle_1`` -> ``rotor angle 1``."""
+    parts = re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
+    return " ".join(parts).lower()
 
 
 def _phase_of(name: str) -> int | None:
