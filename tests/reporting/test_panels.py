@@ -110,7 +110,8 @@ def test_what_trades_off_is_told_with_its_sign_and_never_of_one_recording():
     page = Page("x")
     add_numbers(page, fitted(-0.8, 0.99, 0.0))
     text = "".join(page.parts)
-    assert "a larger mass goes with a smaller gain; were one known, the other would be 60 % as uncertain" in text
+    assert "mass and gain" in text and "a larger value of the first goes with a smaller one of the second" in text
+    assert "were one known, the other would be 60 % as uncertain" in text
     assert text.index("mass") < text.index("<details>") < text.index("zero, a") < text.index("</details>")
 
 
@@ -122,6 +123,15 @@ def test_a_number_has_one_interval_on_a_page():
     found = as_told(Numbers([Number(n, "unit", 0.0, 1.0, 0.1, 1.0, "1") for n in names], np.eye(3)), told, ["x_y"])
     assert [n.value for n in found.numbers] == [2.0, 5.0, 1.0]
     assert [n.sd for n in found.numbers] == pytest.approx([1 / 1.645, 1 / 1.645, 0.1])
+
+
+def test_every_number_has_a_unit_and_is_called_by_its_words():
+    numbers = [Number("x: a", "unit", 0.0, 1.0, 0.1, 1.0, "1", "share of x"), Number("b", "unit", 0, 1, 0.1, 1, "")]
+    page = Page("x")
+    add_numbers(page, Numbers(numbers, np.eye(2)))
+    rows = re.findall(r"<tr><td.*?</tr>", "".join(page.parts))
+    cells = [re.findall(r"<td.*?>(.*?)</td>", row) for row in rows]
+    assert [(c[0], c[5]) for c in cells] == [("share of x", "1"), ("b", "1")]
 
 
 def test_no_number_is_minus_zero():

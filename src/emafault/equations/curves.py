@@ -6,6 +6,7 @@ from scipy.ndimage import uniform_filter1d
 from ..diagnosis.model import Block
 from ..diagnosis.whitening import whiten
 from ..reporting.panels import Curves, Panel
+from ..reporting.regions import coordinate
 from .coordinates import rows_of
 from .diagnose import Diagnosed
 from .electrical import NAMES
@@ -14,10 +15,7 @@ from .point import Point, State
 from .signals import Signals, odd
 
 #: coordinates that a reader may choose, in words
-ALONG = {
-    "time": "time (s)", "rotor_speed": "rotor speed (rad/s)", "rotor_angle": "rotor angle (rad)",
-    "current": "pair current (A)",
-}  # fmt: skip
+ALONG = {n: coordinate(n) for n in ("time", "rotor_speed", "rotor_angle")} | {"current": "pair current (A)"}
 #: measured side of each equation, in words
 QUANTITY = {
     **{name: f"voltage of phase {name[-1]} (V)" for name in NAMES},

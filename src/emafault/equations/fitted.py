@@ -8,7 +8,9 @@ from ..diagnosis.point import is_parameter
 from ..effects import EFFECTS
 from ..reporting.numbers import Number, Numbers, as_told
 from .diagnose import Diagnosed
-from .verdict import CONTROLLER, covariance_of
+from .telling import subject
+from .verdict import covariance_of
+from .words import of_form, of_number
 
 
 def numbers(found: Diagnosed) -> Numbers:
@@ -22,13 +24,20 @@ def numbers(found: Diagnosed) -> Numbers:
         if alias is not None:
             beyond.setdefault(alias, []).append(n)
     names = [*(n for n in own if bench.parameters[n].alias is None), *bench.nuisances]
+    described = {d.id: d for d in bench.described}
     out, mix = [], np.zeros((len(names), len(index)))
     for row, n in enumerate(names):
         p = bench.parameters[n]
-        mix[row, [index[k] for k in (n, *beyond.get(n, ())) if k in index]] = 1.0
+        words, units, factor = of_number(n), _units(n, p.units), 1.0
+        if n.startswith("form."):
+            form = described[n.split(".")[1]]
+            what, units, factor = subject(form, bench.machine.actuator)
+            words = of_form(form, what, n)
+        mix[row, [index[k] for k in (n, *beyond.get(n, ())) if k in index]] = factor
         sd = float(np.sqrt(mix[row] @ covariance @ mix[row]))
         kind = "effect" if n in own or n in beyond else _kind(n)
-        one = Number(_words(n), kind, p.off, found.values[n], sd, bench.prior(n)[1], _units(n, p.units))
+        start, value, prior = (factor * x for x in (p.off, found.values[n], bench.prior(n)[1]))
+        one = Number(_key(n), kind, start, value, sd, abs(prior), units, words)
         out.append(_of_logarithm(one) if ": log_" in one.name else one)
     whole = mix @ covariance @ mix.T
     width = np.sqrt(np.maximum(np.diag(whole), 1e-300))
@@ -40,7 +49,7 @@ def _units(name: str, units: str) -> str:
     group, _, short = name.partition(".")
     listed = EFFECTS[group].parameters if group in EFFECTS else {}
     known = listed.get(short.removeprefix("log_").partition("@")[0])
-    return known.units if known else CONTROLLER.get(short, units)
+    return known.units if known else units
 
 
 def _of_logarithm(n: Number) -> Number:
@@ -56,7 +65,8 @@ def _kind(name: str) -> str:
     return "recording" if "@" in name else "controller" if name.startswith("controller.") else "unit"
 
 
-def _words(name: str) -> str:
+def _key(name: str) -> str:
+    """What ``as_told`` finds a number of the verdict by."""
     name, _, recording = name.partition("@")
     group, _, short = name.rpartition(".")
     words = f"{group.replace('_', ' ')}: {short}" if group else short

@@ -10,6 +10,7 @@ from ..faults import FAULT_NAMES
 from ..reporting.numbers import Numbers, add_numbers
 from ..reporting.page import Page
 from ..reporting.panels import Panel
+from ..reporting.regions import add_regions
 from ..reporting.retrained import MARK
 from .electrical import NAMES
 from .probabilities import basis
@@ -147,14 +148,7 @@ def draw(
         "most recordings (orange: more), and what share of the samples is no measurement.",
     )  # fmt: skip
     page.heading("Where: residual by equation and operating region")
-    rows = [
-        [
-            w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:z.3g} to {w['to']:z.3g}",
-            f"{w['z']:.3g}", f"{w['share']:.1%}",
-        ]
-        for w in verdict["where"]
-    ]  # fmt: skip
-    page.table(["equation", "along", "where most of it lies", "size over the noise", "share"], rows)
+    add_regions(page, verdict["where"])
     if detail is not None:
         page.heading("Measured and predicted, equation by equation")
         page.paragraph(

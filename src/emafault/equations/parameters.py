@@ -27,6 +27,10 @@ SOAK = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
+#: gains of the controller with their units
+GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
+#: of what an effect is fitted in that its catalogue does not have
+UNITS = {"flexibility": "rad/(N m)"}
 
 
 def nuisances(
@@ -42,9 +46,9 @@ def nuisances(
                 out[full] = Parameter(
                     full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
                 )
-    for name in ("position_gain", "speed_gain", "speed_integral_gain", "speed_limit"):
+    for name, units in {**GAINS, "speed_limit": "rad/s"}.items():
         at = getattr(a, name)
-        out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, "")
+        out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, units)
     full = "controller.commutation_time"
     out[full] = Parameter(full, 0.0, 0.0, 2e-5, "s")
     passing = scale("passing_time", a)
@@ -184,7 +188,8 @@ def internal(effect: Effect, actuator: ActuatorParameters) -> dict[str, Internal
         out = {}
         for n, numbers in own.items():
             off, mean, sd = (_factor(effect, n, actuator) * x for x in numbers)
-            out[n] = Internal(off, mean, sd, "")
+            known = effect.parameters.get(n)
+            out[n] = Internal(off, mean, sd, known.units if known else UNITS.get(n, "1"))
         return out
     return {
         n: Internal(p.nominal, p.nominal, _width(p.nominal, p.low, p.high), p.units)

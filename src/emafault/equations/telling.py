@@ -60,6 +60,11 @@ def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, fl
     return known[form.equation][form.driver]
 
 
+def bare(what: str) -> str:
+    """A subject as a label has it: without article and comma."""
+    return what.removeprefix("a ").removeprefix("the ").rstrip(",")
+
+
 def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: ActuatorParameters) -> dict[str, Any]:
     """A described form as the verdict tells it: where, along what, its parameters with 90 % intervals and a sentence.
 
@@ -175,7 +180,7 @@ def picture(form: Described, found: Mapping[str, list[float]], actuator: Actuato
         along = tuple(function.COORDINATES)[int(form.values["coordinate"])]
         axis = f"{along.replace('_', ' ')} ({function.COORDINATES[along]})"
     scaled = {n: [factor * v for v in found[n]] for n in ("before", "after")}
-    label = what.removeprefix("a ").removeprefix("the ").rstrip(",") + ("" if units == "1" else f" ({units})")
+    label = bare(what) + ("" if units == "1" else f" ({units})")
     return {
         "x": found["x"], **scaled, "error": [abs(factor) * e for e in found["error"]],
         "x_label": axis, "y_label": label,

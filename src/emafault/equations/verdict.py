@@ -21,13 +21,13 @@ from . import carried, telling
 from .held_out import HeldOut
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
+from .parameters import GAINS
 from .point import SEEDED
 from .quality import at_a_glance, told
 from .telling import EQUATION, Z
 from .terms import TERMS
 
 SCHEMA = "2.0"
-CONTROLLER = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
 
 
@@ -238,7 +238,7 @@ def _controller(fitted: Fitted) -> dict[str, dict]:
     prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
     covariance = Definite(fit.normal.H[np.ix_(k, k)] + np.diag(prior)).solve(np.eye(len(k)))
     out = {}
-    for name, units in CONTROLLER.items():
+    for name, units in GAINS.items():
         full = f"controller.{name}"
         value, nominal = values[full], bench.parameters[full].off
         sd = float(np.hypot(np.sqrt(covariance[n.index(full), n.index(full)]), SAMPLED * abs(value)))

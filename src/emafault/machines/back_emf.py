@@ -15,6 +15,7 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["build", "distortions", "experiments", "read"]
 NAME = "back_emf"
+WORDS = {"log_k": "logarithm of the back-EMF constant"}
 SHAPE = (2, 3, 5, 7, 11, 13)  # harmonics that the shape of the magnet's field may have
 _PHASES = ("electrical_a", "electrical_b", "electrical_c")
 EFFECTS = (
@@ -30,7 +31,7 @@ def build(case: str, arrays: Arrays) -> Machine:
     rows, scale, explore, confirm, notes = recordings(case, arrays)
     return Machine(
         NAME, case, explore, confirm, rows, _parameters(scale), EFFECTS,
-        dict.fromkeys((*_PHASES, "sensor_voltage"), harmonic), notes=notes, experiments=experiments(),
+        dict.fromkeys((*_PHASES, "sensor_voltage"), harmonic), notes=notes, experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

@@ -15,6 +15,12 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["UNITS", "build", "distortions", "experiments", "read"]
 NAME = "dq_machine"
+WORDS = {
+    "R": "phase resistance",
+    "L_d": "inductance in d",
+    "L_q": "inductance in q",
+    "psi": "flux linkage of the magnets",
+}
 IRON_LOSS = 0.02  # of the apparent power: iron loss that a machine of this kind has
 Values = Mapping[str, np.ndarray]
 
@@ -24,7 +30,8 @@ def build(case: str, arrays: Arrays) -> Machine:
     rows, scale, explore, confirm, note = recordings(case, arrays)
     return Machine(
         NAME, case, explore, confirm, rows, _parameters(scale), EFFECTS,
-        {"electrical_d": u_d, "electrical_q": u_q, "torque": torque}, notes=(note,), experiments=experiments(),
+        {"electrical_d": u_d, "electrical_q": u_q, "torque": torque}, notes=(note,),
+        experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

@@ -13,6 +13,15 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["ENDING", "UNITS", "build", "distortions", "experiments", "read"]
 NAME = "friction_axis"
+WORDS = {
+    "rotor_speed": "speed (m/s)", "position": "position from the middle of the stroke (m)",
+    "M": "mass", "F_v": "viscous friction", "F_c": "Coulomb friction", "F_0": "force",
+    "F_c_difference": "difference of Coulomb friction between the directions, half",
+    "F_v_difference": "difference of viscous friction between the directions, half",
+    "F_s": "force above Coulomb friction at standstill", "log_v_s": "logarithm of Stribeck speed over the largest",
+    "F_vv": "force per squared speed", "c": "stiffness", "F_q": "Coulomb friction per position",
+    "F_t": "Coulomb friction per time", "F_0t": "force per time", "mu": "friction force per acceleration",
+}  # fmt: skip
 
 
 def build(case: str, arrays: Arrays) -> Machine:
@@ -26,7 +35,7 @@ def build(case: str, arrays: Arrays) -> Machine:
             f"{cut} of {count} cycles explore",
             "an error of gtau scales mass and friction alike: this record cannot show it",
         ),
-        experiments=experiments(), words={"rotor_speed": "speed (m/s)"},
+        experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

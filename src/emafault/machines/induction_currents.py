@@ -17,6 +17,12 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["build", "distortions", "experiments", "read"]
 NAME = "induction_currents"
+WORDS = {
+    "u_re": "negative sequence of the healthy currents, real part",
+    "u_im": "negative sequence of the healthy currents, imaginary part",
+    "z_re": "zero sequence of the healthy currents, real part",
+    "z_im": "zero sequence of the healthy currents, imaginary part",
+}
 Values = Mapping[str, np.ndarray]
 EFFECTS = (
     *(
@@ -37,7 +43,7 @@ def build(case: str, arrays: Arrays) -> Machine:
     return Machine(
         NAME, case, found.explore, found.confirm, found.rows, _parameters(found.unbalance, found.zero, found.spread),
         EFFECTS, {"electrical": negative, "sensor_current": zero}, notes=found.notes, observed=found.observed,
-        experiments=experiments(),
+        experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

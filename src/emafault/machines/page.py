@@ -8,6 +8,7 @@ from typing import Any
 from ..reporting import diagnosis as figures
 from ..reporting.numbers import add_numbers
 from ..reporting.page import Page
+from ..reporting.regions import add_regions
 from .diagnose import Diagnosed
 from .shown import numbers, panels
 
@@ -76,14 +77,9 @@ def body(page: Page, found: Diagnosed, key: str, level: int = 3) -> None:
     verdict = found.verdict
     page.heading("What these recordings leave open", level)
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in cannot_tell(verdict)) + "</ul>")
-    rows = [
-        [w["equation"].replace("_", " "), w["along"].replace("_", " "), f"{w['from']:z.3g} to {w['to']:z.3g}",
-         f"{w['z']:.3g}", f"{w['share']:.1%}"]
-        for w in verdict["where"]
-    ]  # fmt: skip
-    if rows:
+    if verdict["where"]:
         page.heading("Residual by equation and operating region", level)
-        page.table(["equation", "along", "most of it lies at", "size over the noise", "share"], rows)
+        add_regions(page, verdict["where"], found.machine.words)
     page.heading("Measured and predicted, equation by equation", level)
     page.paragraph(
         "Before is the base model fitted by itself, after the leading set of effects. From top to bottom: the residual "

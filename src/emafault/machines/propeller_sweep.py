@@ -13,6 +13,7 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["build", "distortions", "experiments", "read"]
 NAME = "propeller_sweep"
+WORDS = {"k": "back-EMF constant", "R": "resistance"}
 EFFECTS = (
     *(Effect(e, ("electrical",)) for e in ("self_heating", "magnet_heating", "commutation_loss", "constant_drop")),
     Effect("voltage_offset", ("sensor_voltage",)), Effect("supply_limit", ("bus",)),
@@ -27,7 +28,7 @@ def build(case: str, arrays: Arrays) -> Machine:
     return Machine(
         NAME, case, explore, confirm, rows, _parameters(scale), EFFECTS, {"electrical": voltage},
         notes=(note, "a voltage gain is a k gain, a current gain an R gain: no row of these sweeps tells them apart"),
-        experiments=experiments(),
+        experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from ..reporting.numbers import Number, Numbers, as_told
 from ..reporting.panels import Curves, Panel
+from ..reporting.regions import coordinate
 from .diagnose import Diagnosed
 from .statement import Rows
 from .verdict import covariance_of
@@ -24,8 +25,8 @@ def panels(found: Diagnosed) -> list[Panel]:
 def _curves(found: Diagnosed, rows: Rows, left: np.ndarray) -> Curves:
     deviation = np.sqrt(np.diag(rows.covariance))
     words = found.machine.words
-    along = {words.get(rows.along, rows.along.replace("_", " ")): 0.5 * (rows.low + rows.high)}
-    along |= {words.get(n, n.replace("_", " ")): np.asarray(x, float) for n, x in rows.beside.items()}
+    along = {coordinate(rows.along, words): 0.5 * (rows.low + rows.high)}
+    along |= {coordinate(n, words): np.asarray(x, float) for n, x in rows.beside.items()}
     white = np.linalg.solve(np.linalg.cholesky(rows.covariance), left.T)
     before, after = (float(s) for s in np.sum(white**2, axis=0))
     aside = rows.recording in found.machine.confirm
@@ -47,13 +48,15 @@ def numbers(found: Diagnosed) -> Numbers:
         n = names[k]
         p, sd = bench.parameters[n], float(np.sqrt(covariance[k, k]))
         kind = "recording" if "@" in n else "effect" if n in own else "unit"
-        out.append(Number(_words(n), kind, p.off, after[n], sd, bench.prior(n)[1], p.units))
+        said = _name(n, found.machine.words.get(n.partition("@")[0].rpartition(".")[2], ""))
+        out.append(Number(_name(n), kind, p.off, after[n], sd, bench.prior(n)[1], p.units, said))
     width = np.sqrt(np.diag(covariance))[kept]
     listed = {e.id for e in found.machine.effects} & set(fitted.leading.units)
     found_numbers = Numbers(out, covariance[np.ix_(kept, kept)] / np.outer(width, width))
     return as_told(found_numbers, found.verdict, listed)
 
 
-def _words(name: str) -> str:
+def _name(name: str, words: str = "") -> str:
+    """An effect and its parameter, by its key or in words."""
     effect, _, short = name.rpartition(".")
-    return f"{effect.replace('_', ' ')}: {short}" if effect else short
+    return f"{effect.replace('_', ' ')}: {words or short}" if effect else words or short

@@ -16,6 +16,7 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["OPTIONAL", "UNITS", "build", "distortions", "experiments", "read"]
 NAME = "six_step_bus"
+WORDS = {"k": "back-EMF constant", "R": "resistance", "R_k2": "resistance over the squared back-EMF constant"}
 SPAN = float(np.log(TAU[-1] / TAU[0]))  # of the logarithm of a thermal time constant over the shortest
 Values = Mapping[str, np.ndarray]
 
@@ -30,7 +31,7 @@ def build(case: str, arrays: Arrays) -> Machine:
     }  # fmt: skip
     return Machine(
         NAME, case, ("first pass",), ("return",), rows, _parameters(scale), _effects(scale, found),
-        {e: f for e, f in equations.items() if e in found}, notes=notes, experiments=experiments(),
+        {e: f for e, f in equations.items() if e in found}, notes=notes, experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

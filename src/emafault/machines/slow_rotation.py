@@ -15,6 +15,7 @@ from .statement import Arrays, Effect, Experiment, Machine, Parameter, freedom, 
 
 __all__ = ["build", "distortions", "experiments", "read"]
 NAME = "slow_rotation"
+WORDS = {"i_f": "current against friction"}
 
 
 def build(case: str, arrays: Arrays) -> Machine:
@@ -25,7 +26,7 @@ def build(case: str, arrays: Arrays) -> Machine:
     equation = partial(current, waves=waves, second=2 * pairs if 2 * pairs <= ORDERS else 0)
     return Machine(
         NAME, case, explore, confirm, rows, _parameters(size, waves, moving), _effects(waves, moving),
-        {"torque": equation}, notes=notes, experiments=experiments(),
+        {"torque": equation}, notes=notes, experiments=experiments(), words=WORDS,
     )  # fmt: skip
 
 

@@ -130,7 +130,8 @@ class Machine:
     explore, confirm : names of the recordings that are looked at first, and of those set aside
     equations : name -> what it says of rows; names of one equation's parts share their beginning (``electrical_d``)
     observed : effects that the recordings show for certain, with their parameters
-    words : coordinates in words, where they are not those of a rotor
+    words : coordinates in words with their unit in brackets, where they are not those of a rotor, and parameters in
+        words
     """
 
     name: str

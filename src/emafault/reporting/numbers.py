@@ -18,7 +18,8 @@ MOST = 12  # pairs that are shown
 class Number:
     """A fitted number: value before the fit and after, standard deviation of prior and posterior, and what it is.
 
-    ``kind``: effect, unit, controller or recording; ``fixed`` where the fit gives no width.
+    ``name`` is its key, ``words`` what a page calls it (the key, where there are none); ``kind``: effect, unit,
+    controller or recording; ``units``: "1" where it has no dimension.
     """
 
     name: str
@@ -28,6 +29,12 @@ class Number:
     sd: float
     prior: float
     units: str
+    words: str = ""
+
+    @property
+    def said(self) -> str:
+        """What a page calls it."""
+        return self.words or self.name
 
 
 @dataclass(frozen=True)
@@ -106,13 +113,13 @@ def trading(found: Numbers) -> list[tuple[Number, Number, float]]:
 
 def _row(n: Number) -> list[str]:
     told = "yes" if n.sd < TOLD * n.prior else "little"
-    units = "" if n.units == "1" else n.units
     interval = f"{n.value - Z * n.sd:z.4g} to {n.value + Z * n.sd:z.4g}"
-    return [n.name, KINDS[n.kind], f"{n.start:z.4g}", f"{n.value:z.4g}", interval, units, told]
+    return [n.said, KINDS[n.kind], f"{n.start:z.4g}", f"{n.value:z.4g}", interval, n.units or "1", told]
 
 
 def _pair(a: Number, b: Number, r: float) -> list[str]:
     way = "larger" if r > 0.0 else "smaller"
     left = float(np.sqrt(max(1.0 - r * r, 0.0)))
     known = f"were one known, the other would be {100 * left:.0f} % as uncertain"
-    return [f"{a.name} and {b.name}", f"{r:z.3f}", f"a larger {a.name} goes with a {way} {b.name}; {known}"]
+    means = f"a larger value of the first goes with a {way} one of the second; {known}"
+    return [f"{a.said} and {b.said}", f"{r:z.3f}", means]

@@ -1,0 +1,119 @@
+"""Fitted numbers of the reference actuator in words, as the table of a page has them; keys stay those of the model."""
+
+from ..diagnosis.described import Described
+from .point import SEEDED
+from .telling import bare
+
+FAULTS = {
+    "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
+    "Nc": "shorted turns of phase c, share of all", "xi_x": "static eccentricity along x, share of the air gap",
+    "xi_y": "static eccentricity along y, share of the air gap",
+}  # fmt: skip
+CONTROLLER = {
+    "position_gain": "position gain", "speed_gain": "speed gain", "speed_integral_gain": "integral gain of the speed",
+    "speed_limit": "limit of the demanded speed",
+    "commutation_time": "commutation time of a small current",
+    "commutation_slope": "commutation time, more per ampere",
+    "commutation_speed": "commutation time, more at the speed at which the back-EMF is half the bus voltage",
+    "commutation_power": "commutation time, more per ampere at that speed",
+    "timing": "delay of the sampled demand against the recording",
+}  # fmt: skip
+#: of the catalogue and of what an effect is fitted in, by effect; "{}" is a phase
+EFFECTS = {
+    "angle_offset": {"offset": "recorded less true"},
+    "back_emf_shape": {"width": "width of the plateau", "h5": "fifth harmonic", "h7": "seventh harmonic"},
+    "backlash": {"blk": "play"},
+    "bus_resistance": {"R": "resistance"},
+    "bus_voltage": {"Vdc": "voltage"},
+    "cogging": {"a": "torque amplitude"},
+    "compliance": {"K": "stiffness", "C": "damping", "flexibility": "inverse of the stiffness"},
+    "contact_resistance": {"R_x_{}": "phase {}"},
+    "control_delay": {"delay": "time"},
+    "current_gain": {"g_{}": "phase {}, recorded over true"},
+    "current_offset": {"o_{}": "phase {}"},
+    "dynamic_eccentricity": {
+        "d": "amplitude, share of the air gap", "psi": "angle", "d_cos": "cosine part, share of the air gap",
+        "d_sin": "sine part, share of the air gap",
+    },
+    "friction_asymmetry": {"a": "half the relative difference of the directions"},
+    "friction_level": {"scale": "Coulomb friction over nominal"},
+    "friction_temperature": {"beta": "relative change per kelvin"},
+    "hall_displacement": {"d_{}": "sensor of phase {}"},
+    "inductance_saturation": {"s": "coefficient of the squared current"},
+    "inductance_tolerance": {"L_scale": "inductance over nominal"},
+    "inertia": {"scale": "inertia over nominal"},
+    "load_constant": {"T": "torque"},
+    "load_spring": {"c": "stiffness"},
+    "magnet_temperature": {"alpha_m": "temperature coefficient"},
+    "self_heating": {"heating_rate": "inverse of the heat capacity", "Rth": "thermal resistance", "C": "heat capacity"},
+    "speed_latency": {"tau": "time constant"},
+    "speed_quantisation": {"step": "size of a step"},
+    "speed_scale": {"scale": "recorded over true"},
+    "stribeck": {"a": "torque above Coulomb friction at standstill", "w_s": "Stribeck speed"},
+    "unit_calibration": {"R_scale": "resistance over nominal", "k_scale": "back-EMF constant over nominal"},
+    "virtual_neutral": {
+        "on": "share of the mean of the three voltages", "w_a": "excess weight of phase a",
+        "w_b": "excess weight of phase b",
+    },
+    "viscous_friction": {"scale": "viscous friction over nominal"},
+    "voltage_gain": {"g_{}": "phase {}, recorded over true"},
+}  # fmt: skip
+FORMS = {
+    "order": "wave along the rotor angle", "frequency": "oscillation", "bump": "bump", "step_change": "step",
+    "function": "function", "power": "power of the speed", "memory": "low-pass filtered part",
+}  # fmt: skip
+_PASSING = {
+    "ahead_out": "forward, the current flowing out of the staying phase", "ahead_in": "forward, flowing into it",
+    "back_out": "backward, flowing out of it", "back_in": "backward, flowing into it",
+}  # fmt: skip
+
+
+def effect_number(effect: str, short: str) -> str:
+    """A parameter of a listed effect; the key itself where there are no words for it."""
+    known = {k.format(j): w.format(j) for k, w in EFFECTS.get(effect, {}).items() for j in "abc"}
+    return f"{effect.replace('_', ' ')}: {known.get(short, short)}"
+
+
+def of_number(name: str) -> str:
+    """A nuisance or a parameter of an effect or of the measuring chain, by its full name."""
+    name, _, recording = name.partition("@")
+    group, _, short = name.rpartition(".")
+    words = _of_group(group, short)
+    return f"{words}, {recording.removesuffix('.nc')}" if recording else words
+
+
+def _of_group(group: str, short: str) -> str:
+    phase = short[-1]
+    if not group:
+        fixed = {"dT": "winding temperature less the recorded one", "output_zero": "zero of the output position"}
+        return (fixed | FAULTS).get(short, short)
+    if f"{group}." == SEEDED:
+        return f"{FAULTS[short]}, in all seeded recordings"
+    if group == "controller":
+        if short.startswith("edge_"):
+            return f"commutation of phase {phase} comes early by"
+        if short.startswith("commutation_time_"):
+            return f"commutation time, more of phase {phase}"
+        if short.startswith("passing_"):
+            _, phase, way = short.split("_", 2)
+            return f"commutation time, more of phase {phase}: {_PASSING[way]}"
+        return CONTROLLER.get(short, short)
+    channel, _, side = short.partition("_")
+    chain = {
+        "skew": f"{short} channel is sampled late by",
+        "rounded": f"rounding of the current of phase {short}",
+        "lag": f"{'output position' if channel == 'output' else channel} channel comes {side} by",
+        "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
+        "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
+        "drift_current": f"drift of the current channel of phase {short}",
+        "drift_voltage": f"drift of the voltage channel of phase {short}",
+    }
+    return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
+
+
+def of_form(form: Described, what: str, name: str) -> str:
+    """A coefficient of a described form, by its full name; ``what`` has the form."""
+    name, _, recording = name.partition("@")
+    coefficient = name.rpartition(".")[2].replace("at_100_rad_s", "at 100 rad/s").replace("c_", "coefficient ")
+    words = f"{bare(what)}: {FORMS[form.word]}, {coefficient}"
+    return f"{words}, {recording.removesuffix('.nc')}" if recording else words
