@@ -75,12 +75,14 @@ def test_the_page_has_a_chart_of_every_equation_and_every_fitted_number(written,
     for equation in ("electrical_a", "electrical_b", "electrical_c", "torque", "sensor_speed", "position", "control"):
         assert f'id="panel_{equation}"' in page
     for number in (
-        "magnet temperature: alpha_m",
-        "unit calibration: R_scale",
-        "inertia: scale",
-        "controller: speed_gain",
+        "magnet temperature: temperature coefficient",
+        "unit calibration: resistance relative to nominal",
+        "inertia: relative to nominal",
+        "speed gain",
     ):
         assert f">{number}</td>" in page
+    said = re.findall(r'<figure id="(quality|which|how_far|faults)">.*?alt="(.*?)"', page)
+    assert len(said) == 4 and all(re.search(r"\d|none", text) for _, text in said)
     falls = re.search(r"Electrical a: the residual over the noise falls from ([\d.]+) to ([\d.]+)", page)
     assert falls and float(falls[2]) < 1.1 < float(falls[1])
     assert len(page) < 3e6

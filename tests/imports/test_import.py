@@ -1,6 +1,7 @@
 """Raw logs with what goes wrong at a bench: what was simulated comes out, or a line that says what to do."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,8 @@ def test_any_format_through_the_command(file, tmp_path, fine, truth, capsys):
     assert recording.attributes["source"] == file and recording.known["phase_voltage"] == {"reference": "modelled_star"}
     page = (tmp_path / "bench" / "import.html").read_text()
     assert "pole pairs" in page and "What these recordings cannot tell" in page
+    (said,) = re.findall(r'<img alt="(.*?)"', page)
+    assert f"speed up to {np.abs(recording.rotor_speed).max():.3g} rad/s" in said and "mrad from its command" in said
 
 
 def scaled(factor, *names):

@@ -1,6 +1,8 @@
 """Comparing reports: the page names the variant that identifies best."""
 
+import html
 import json
+import re
 
 import pytest
 
@@ -37,6 +39,8 @@ def test_the_best_variant_is_named(tmp_path, bounds, says):
     compare_variants("study", "Which?", names, files, tmp_path / "report.html", tmp_path / "figures")
     text = (tmp_path / "report.html").read_text()
     assert says in text
+    (said,) = re.findall(r'<img alt="(.*?)"', text)
+    assert says in html.unescape(said)
     assert not same or "the first within 5 % of it is runs 2, 0.20500" in text
 
 

@@ -1,6 +1,7 @@
 """One fault from several recordings: errors at their bound, which falls with their number."""
 
 import json
+import re
 
 import pytest
 
@@ -27,4 +28,8 @@ def test_errors_stand_at_the_bound_that_falls_with_the_number_of_recordings(tmp_
         one, three = (by["nine_tolerance", features, n]["bound"] for n in (1, 3))
         assert three["dT"] == pytest.approx(one["dT"], rel=0.15)  # what the unit is off by does not average out
     draw_several(spec, str(tmp_path / "errors.json"), tmp_path / "report.html", tmp_path / "figures")
-    assert 'id="nine_tolerance"' in (tmp_path / "report.html").read_text()
+    text = (tmp_path / "report.html").read_text()
+    assert 'id="nine_tolerance"' in text
+    last = by["nine_tolerance", "nine", 3]
+    (said,) = re.findall(r'id="nine_tolerance".*?alt="(.*?)"', text)
+    assert f"(bound {last['bound']['dT']:.2g})" in said and "nine features, 1 to 3 recordings" in said

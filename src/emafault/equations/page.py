@@ -140,12 +140,16 @@ def draw(
             page.figure(
                 "described", figures.draw_described(curves),
                 "What the equation leaves along the form, without it in the model and with it, with 90 % bands.",
+                figures.described_in_words(curves),
             )  # fmt: skip
     page.heading("How good the recordings are")
+    cells = in_cells(verdict["quality"])
     page.figure(
-        "quality", figures.draw_quality(*in_cells(verdict["quality"])),
-        "Noise of each channel (of the voltages, with the inverter's ripple), coloured by how it compares with that of "
-        "most recordings (orange: more), and what share of the samples is no measurement.",
+        "quality", figures.draw_quality(*cells),
+        "Noise of each channel (of the voltages, with the inverter's ripple). Colours compare it with the median of "
+        "the recordings: white is the same, orange more (deepest from four times), purple less (deepest from a "
+        "quarter). Bold and framed is what share of the samples is no measurement: clipped, held, spikes, or in steps.",
+        figures.quality_in_words(*cells),
     )  # fmt: skip
     page.heading("Where: residual by equation and operating region")
     add_regions(page, verdict["where"])
@@ -203,10 +207,12 @@ def draw(
         add_numbers(page, detail.numbers)
     if verdict["fault_vector"]:
         page.heading("Fault vector before and after")
+        groups = fault_vectors(verdict, truths)
         page.figure(
             "faults",
-            figures.draw_faults(fault_vectors(verdict, truths)),
+            figures.draw_faults(groups),
             "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
+            figures.faults_in_words(groups),
         )
     page.parts.append(MARK)
     page.heading("What to record next")

@@ -13,9 +13,9 @@ CONTROLLER = {
     "position_gain": "position gain", "speed_gain": "speed gain", "speed_integral_gain": "integral gain of the speed",
     "speed_limit": "limit of the demanded speed",
     "commutation_time": "commutation time of a small current",
-    "commutation_slope": "commutation time, more per ampere",
-    "commutation_speed": "commutation time, more at the speed at which the back-EMF is half the bus voltage",
-    "commutation_power": "commutation time, more per ampere at that speed",
+    "commutation_slope": "commutation time, increase per ampere",
+    "commutation_speed": "commutation time, increase at the speed at which the back-EMF is half the bus voltage",
+    "commutation_power": "commutation time, increase per ampere at that speed",
     "timing": "delay of the sampled demand against the recording",
 }  # fmt: skip
 #: of the catalogue and of what an effect is fitted in, by effect; "{}" is a phase
@@ -24,7 +24,7 @@ EFFECTS = {
     "back_emf_shape": {"width": "width of the plateau", "h5": "fifth harmonic", "h7": "seventh harmonic"},
     "backlash": {"blk": "play"},
     "bus_resistance": {"R": "resistance"},
-    "bus_voltage": {"Vdc": "voltage"},
+    "bus_voltage": {"Vdc": "of the supply"},
     "cogging": {"a": "torque amplitude"},
     "compliance": {"K": "stiffness", "C": "damping", "flexibility": "inverse of the stiffness"},
     "contact_resistance": {"R_x_{}": "phase {}"},
@@ -36,12 +36,12 @@ EFFECTS = {
         "d_sin": "sine part, share of the air gap",
     },
     "friction_asymmetry": {"a": "half the relative difference of the directions"},
-    "friction_level": {"scale": "Coulomb friction over nominal"},
+    "friction_level": {"scale": "Coulomb friction relative to nominal"},
     "friction_temperature": {"beta": "relative change per kelvin"},
     "hall_displacement": {"d_{}": "sensor of phase {}"},
     "inductance_saturation": {"s": "coefficient of the squared current"},
-    "inductance_tolerance": {"L_scale": "inductance over nominal"},
-    "inertia": {"scale": "inertia over nominal"},
+    "inductance_tolerance": {"L_scale": "relative to nominal"},
+    "inertia": {"scale": "relative to nominal"},
     "load_constant": {"T": "torque"},
     "load_spring": {"c": "stiffness"},
     "magnet_temperature": {"alpha_m": "temperature coefficient"},
@@ -50,12 +50,14 @@ EFFECTS = {
     "speed_quantisation": {"step": "size of a step"},
     "speed_scale": {"scale": "recorded over true"},
     "stribeck": {"a": "torque above Coulomb friction at standstill", "w_s": "Stribeck speed"},
-    "unit_calibration": {"R_scale": "resistance over nominal", "k_scale": "back-EMF constant over nominal"},
+    "unit_calibration": {
+        "R_scale": "resistance relative to nominal", "k_scale": "back-EMF constant relative to nominal",
+    },
     "virtual_neutral": {
         "on": "share of the mean of the three voltages", "w_a": "excess weight of phase a",
         "w_b": "excess weight of phase b",
     },
-    "viscous_friction": {"scale": "viscous friction over nominal"},
+    "viscous_friction": {"scale": "relative to nominal"},
     "voltage_gain": {"g_{}": "phase {}, recorded over true"},
 }  # fmt: skip
 FORMS = {
@@ -93,10 +95,10 @@ def _of_group(group: str, short: str) -> str:
         if short.startswith("edge_"):
             return f"commutation of phase {phase} comes early by"
         if short.startswith("commutation_time_"):
-            return f"commutation time, more of phase {phase}"
+            return f"commutation time, deviation of phase {phase}"
         if short.startswith("passing_"):
             _, phase, way = short.split("_", 2)
-            return f"commutation time, more of phase {phase}: {_PASSING[way]}"
+            return f"commutation time, deviation of phase {phase}: {_PASSING[way]}"
         return CONTROLLER.get(short, short)
     channel, _, side = short.partition("_")
     chain = {

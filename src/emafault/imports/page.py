@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import yaml
 
 from ..io.recording import Recording
@@ -52,11 +53,22 @@ def draw(result: "Imported", given: Mapping[str, Any]) -> Page:
     )
     for name, recording in result.recordings.items():
         page.figure(
-            name.removesuffix(".nc"), _curves(recording), f"{name}: interval means, and the shaft with its command"
-        )
+            name.removesuffix(".nc"), _curves(recording), f"{name}: interval means, and the shaft with its command",
+            _in_words(recording),
+        )  # fmt: skip
     page.heading("Map")
     page.preformatted(yaml.safe_dump(dict(given), sort_keys=False))
     return page
+
+
+def _in_words(r: Recording) -> str:
+    """What the curves show, for who cannot see them."""
+    volts, amps, speed = (np.abs(x).max() for x in (r.phase_voltage, r.phase_current, r.rotor_speed))
+    apart = 1e3 * np.abs(r.output_position - r.commanded_position).max()
+    return (
+        f"Voltages up to {volts:.3g} V, currents up to {amps:.3g} A, speed up to {speed:.3g} rad/s; the shaft turns "
+        f"through {1e3 * np.ptp(r.output_position):.3g} mrad and is at most {apart:.3g} mrad from its command."
+    )
 
 
 def _curves(recording: Recording):

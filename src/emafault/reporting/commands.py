@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from .style import plt, readable_log
+from .style import AFTER, PHASE_COLOURS, plt, readable_log
 
-COLOURS = {"paper": "#b5651d", "free": "#2e86ab", "loaded": "#c2185b"}
+COLOURS = dict(zip(("paper", "free", "loaded"), PHASE_COLOURS, strict=True))
 OUTPUTS = {"N": "N", "xi": "ξ", "dT": "ΔT (K)"}
 
 
@@ -49,7 +49,7 @@ def signals(of: Mapping[str, Mapping[str, np.ndarray]], interval: float):
     for column, (label, own) in enumerate(of.items()):
         time = interval * np.arange(1, own["rotor_speed"].shape[1] + 1)
         for row, (name, (unit, pick)) in enumerate(rows.items()):
-            grid[row][column].plot(time, pick(own[name][0]), color="#2e86ab", lw=0.8)
+            grid[row][column].plot(time, pick(own[name][0]), color=AFTER, lw=0.8)
             if not column:
                 grid[row][column].set_ylabel(unit)
         grid[0][column].set_title(label, loc="left", fontsize=10)

@@ -8,7 +8,8 @@ import numpy as np
 
 from . import style
 
-BEFORE, AFTER, MEASURED, FLOOR = "#c8553d", "#2a9d8f", "#22262b", "#8a8a8a"
+BEFORE, AFTER, MEASURED, FLOOR = style.BEFORE, style.AFTER, style.INK, style.GREY
+FAINT, OCTAVES = 0.7, 2.0  # of the colours of the noise: opacity, and powers of two at which they are deepest
 
 
 def draw_ranking(entries: Sequence[Mapping[str, Any]]) -> plt.Figure:
@@ -150,6 +151,24 @@ def draw_faults(groups: Sequence[Mapping[str, Any]]) -> plt.Figure:
     return fig
 
 
+def faults_in_words(groups: Sequence[Mapping[str, Any]]) -> str:
+    """What the picture of the fault vector shows, for who cannot see it; ``groups`` as ``draw_faults`` has them."""
+    said = []
+    for group in groups:
+        after = [f"{c} {p['value']:z.3g} ({p['low']:z.3g} to {p['high']:z.3g})" for c, p in group["after"].items()]
+        text = f"{group['label'].replace(chr(10), ' ')}, after: {', '.join(after)}"
+        if group["truth"]:
+            holds = [
+                f"{sum(group[stage][c]['low'] <= x <= group[stage][c]['high'] for c, x in known.items())} of "
+                f"{len(known)} {stage}"
+                for stage in ("before", "after")
+                for known in [{c: x for c, x in group["truth"].items() if c in group[stage]}]
+            ]
+            text += f"; intervals that hold the truth: {', '.join(holds)}"
+        said.append(text)
+    return f"{'. '.join(said)}."
+
+
 def draw_described(curves: Sequence[Mapping[str, Any]]) -> plt.Figure:
     """What an equation leaves along a described form, with it out of the model and in, with 90 % bands.
 
@@ -170,6 +189,18 @@ def draw_described(curves: Sequence[Mapping[str, Any]]) -> plt.Figure:
     return fig
 
 
+def described_in_words(curves: Sequence[Mapping[str, Any]]) -> str:
+    """What the picture of described forms shows, for who cannot see it; ``curves`` as ``draw_described`` has them."""
+    said = []
+    for c in curves:
+        before, after = (float(np.sqrt(np.mean(np.square(c[stage])))) for stage in ("before", "after"))
+        said.append(
+            f"{c['title']}: along {c['x_label']}, {c['y_label']} is {before:.2g} without it and {after:.2g} with it, "
+            f"root mean square; its standard error is {float(np.median(c['error'])):.2g}"
+        )
+    return f"{'. '.join(said)}."
+
+
 def draw_quality(
     rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]
 ) -> plt.Figure:
@@ -179,14 +210,18 @@ def draw_quality(
     are lost.
     """
     fig, ax = plt.subplots(figsize=(1.7 * len(columns) + 2.6, 0.44 * len(rows) + 0.9))
-    noise = np.array([[np.log2(max(c["relative"], 1e-3)) for c in row] for row in cells])
-    ax.imshow(noise, cmap="PuOr_r", vmin=-2.0, vmax=2.0, aspect="auto", alpha=0.7)
+    octaves = np.array([[np.log2(max(c["relative"], 1e-3)) for c in row] for row in cells])
+    shade = plt.get_cmap("PuOr_r")(0.5 + 0.5 * np.clip(octaves / OCTAVES, -1.0, 1.0))[..., :3]
+    shade = 1.0 - FAINT * (1.0 - shade)
+    ax.imshow(shade, aspect="auto")
     for k, row in enumerate(cells):
         for m, cell in enumerate(row):
             ax.text(
-                m, k, cell["text"], ha="center", va="center", fontsize=8,
-                color=BEFORE if cell["fault"] else MEASURED, weight="bold" if cell["fault"] else "normal",
+                m, k, cell["text"], ha="center", va="center", fontsize=8.5, color=style.ink_on(shade[k, m]),
+                weight="bold" if cell["fault"] else "normal",
             )  # fmt: skip
+            if cell["fault"]:
+                ax.add_patch(plt.Rectangle((m - 0.47, k - 0.42), 0.94, 0.84, fill=False, edgecolor=MEASURED, lw=1.6))
     ax.set_xticks(range(len(columns)), columns)
     ax.set_yticks(range(len(rows)), rows)
     ax.xaxis.tick_top()
@@ -195,3 +230,18 @@ def draw_quality(
         spine.set_visible(False)
     ax.grid(visible=False)
     return fig
+
+
+def quality_in_words(rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]) -> str:
+    """What the picture of the recordings' quality shows, for who cannot see it; as ``draw_quality`` takes it."""
+    lost, more = [], []
+    for row, line in zip(rows, cells, strict=True):
+        for column, cell in zip(columns, line, strict=True):
+            if cell["fault"]:
+                lost.append(f"{row}, {column}: {cell['text']}")
+            elif not 0.5 < cell["relative"] < 2.0:
+                more.append(f"{row}, {column}: {cell['text']}, {cell['relative']:.2g} times the median")
+    return (
+        f"No measurement: {'; '.join(lost) or 'none'}. "
+        f"Noise twice the median of the recordings or more, or half of it or less: {'; '.join(more) or 'none'}."
+    )

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..faults import FAULT_NAMES
-from .style import GREY, LABELS, colour, named, plt, readable_log
+from .style import AFTER, BEFORE, GREY, INK, LABELS, colour, named, plt, readable_log
 
 
 def error_boxes(errors: Mapping[tuple[str, str], np.ndarray], bound: Mapping[str, float] | None):
@@ -31,18 +31,27 @@ def error_boxes(errors: Mapping[tuple[str, str], np.ndarray], bound: Mapping[str
                 whis=(5, 95),
                 showfliers=False,
                 showmeans=True,
-                meanprops={"marker": "D", "markersize": 4, "markerfacecolor": "#1d1f21", "markeredgecolor": "none"},
-                medianprops={"color": "#1d1f21"},
+                meanprops={"marker": "D", "markersize": 4, "markerfacecolor": INK, "markeredgecolor": "none"},
+                medianprops={"color": INK},
                 patch_artist=True,
                 boxprops={"facecolor": colour(key[0]), "alpha": 0.55, "edgecolor": colour(key[0])},
             )
         if bound:
-            axes.axvline(bound[component], color="#d1495b", lw=1.2, ls="--")
+            axes.axvline(bound[component], color=BEFORE, lw=1.2, ls="--")
         axes.set_xscale("log")
         axes.set_title(f"absolute error of {LABELS[component]}", loc="left", fontsize=10)
         axes.set_yticks([-place for place in range(len(names))], [named(*key) for key in names])
         axes.grid(axis="y", visible=False)
     return figure
+
+
+def errors_in_words(errors: Mapping[tuple[str, str], np.ndarray], bound: Mapping[str, float] | None) -> str:
+    """What the box plots show, for who cannot see them: mean absolute errors, and those at the bound."""
+    rows = {named(*key): np.nanmean(np.abs(e), axis=0) for key, e in errors.items()}
+    if bound:
+        rows["bound"] = np.array([bound[c] for c in FAULT_NAMES])
+    said = [f"{name} {', '.join(f'{c} {x:.2g}' for c, x in zip(FAULT_NAMES, row))}" for name, row in rows.items()]
+    return f"Mean absolute errors. {'; '.join(said)}."
 
 
 def residuals_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, truth: np.ndarray):
@@ -54,8 +63,8 @@ def residuals_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, t
         missed = (t < low[pick, j]) | (t > high[pick, j])
         bars = np.stack([v - low[pick, j], high[pick, j] - v])
         for rows, dot, bar, label in (
-            (~missed, "#2e86ab", "#a9cde0", "interval holds the truth"),
-            (missed, "#d1495b", "#eab4bb", "interval misses it"),
+            (~missed, AFTER, "#99c7e0", "interval holds the truth"),
+            (missed, BEFORE, "#e6b999", "interval misses it"),
         ):
             axes.errorbar(
                 t[rows], (v - t)[rows], yerr=bars[:, rows], fmt=".", ms=4, lw=0.9, color=dot, ecolor=bar, label=label
@@ -67,6 +76,14 @@ def residuals_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, t
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
+
+
+def residuals_in_words(value: np.ndarray, low: np.ndarray, high: np.ndarray, truth: np.ndarray) -> str:
+    """What the residuals show, for who cannot see them; (run, 6) each, of which at most 100 runs count."""
+    value, low, high, truth = (x[:100] for x in (value, low, high, truth))
+    held, size = ((low <= truth) & (truth <= high)).sum(axis=0), np.nanmean(np.abs(value - truth), axis=0)
+    said = [f"{c} in {n} of {len(truth)}, mean error {s:.2g}" for c, n, s in zip(FAULT_NAMES, held, size)]
+    return f"Intervals hold the truth of {'; '.join(said)}."
 
 
 def variants(names: Sequence[str], tables: Mapping[str, Mapping[str, Sequence[float]]]):
@@ -82,7 +99,7 @@ def variants(names: Sequence[str], tables: Mapping[str, Mapping[str, Sequence[fl
     for axes, (output, lines) in zip(grid[0], tables.items()):
         for number, (label, values) in enumerate(lines.items()):
             if label == "bound":
-                axes.plot(values, places, "|", color="#d1495b", ms=14, mew=2, label="Cramer-Rao bound")
+                axes.plot(values, places, "|", color=BEFORE, ms=14, mew=2, label="Cramer-Rao bound")
             else:
                 method = label.split(",")[0].replace(" ", "_")
                 marker = "o" if "network" in label else "s" if "closed" in label else "D"

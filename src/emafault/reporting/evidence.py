@@ -1,6 +1,6 @@
 """Pictures of the check of the evidence: ranks, coverage, reliability of inclusion probabilities."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from .page import Page
-from .style import GREY
+from .style import AFTER, GREY
 
-BLUE = "#2e86ab"
 BAND = "#e6eef2"
 KINDS = {
     "library": "Effects in the library's form",
@@ -27,7 +26,7 @@ def draw_ranks(found: Mapping[str, Any]) -> plt.Figure:
             ranks = found[arm][quantity]
             place = (np.arange(len(ranks["counts"])) + 0.5) / len(ranks["counts"])
             axis.axhspan(ranks["low"], ranks["high"], color=BAND)
-            axis.bar(place, ranks["counts"], width=0.9 / len(place), color=BLUE)
+            axis.bar(place, ranks["counts"], width=0.9 / len(place), color=AFTER)
             p = "-" if ranks["p"] is None else f"{ranks['p']:.2g}"
             title = "a nuisance, all sets" if quantity == "nuisance" else "a parameter of the true set"
             axis.set_title(f"{title}, {words}\n{ranks['count']} ranks, p = {p}", fontsize=9)
@@ -44,7 +43,7 @@ def draw_coverage(found: Mapping[str, Any]) -> plt.Figure:
         c = {k: np.array(v) for k, v in found[arm]["coverage"].items()}
         axis.fill_between(c["credibility"], c["low"], c["high"], color=BAND, step=None)
         axis.plot([0, 1], [0, 1], color=GREY, linewidth=0.8)
-        axis.plot(c["credibility"], c["coverage"], color=BLUE)
+        axis.plot(c["credibility"], c["coverage"], color=AFTER)
         axis.set_title(f"{words}, p = {float(c['p']):.2g}", fontsize=9)
         axis.set_xlabel("credibility")
     axes[0].set_ylabel("expected coverage")
@@ -63,7 +62,7 @@ def draw_reliability(found: Mapping[str, Any]) -> plt.Figure:
         axis.plot(line, line, color=GREY, linewidth=0.8)
         middle, low, high = (np.clip(x, *line) for x in (mean, mean - band, mean + band))
         axis.vlines(middle, low, high, color=BAND, linewidth=9)
-        axis.plot(middle, np.clip(share, *line), "o", color=BLUE)
+        axis.plot(middle, np.clip(share, *line), "o", color=AFTER)
         axis.set_title(words, fontsize=9)
         axis.set_xlabel("inclusion probability")
         for way in (axis.xaxis, axis.yaxis):
@@ -93,10 +92,45 @@ def draw_page(scores: Mapping[str, Any], report: Path, figures: Path) -> None:
             f"beats all it saw in {found['missed']:.1%}. Told 90 % intervals of the true set's effects hold {share} of "
             f"{told['count']} parameters."
         )
-        page.figure(f"{kind}_ranks", draw_ranks(found), "Simulation-based calibration: ranks of the truth.")
-        page.figure(f"{kind}_coverage", draw_coverage(found), "Expected coverage about random points (TARP).")
-        page.figure(f"{kind}_reliability", draw_reliability(found), "Inclusion probabilities against what is on.")
+        page.figure(
+            f"{kind}_ranks", draw_ranks(found), "Simulation-based calibration: ranks of the truth.",
+            _in_words(found, _ranks_in_words),
+        )  # fmt: skip
+        page.figure(
+            f"{kind}_coverage", draw_coverage(found), "Expected coverage about random points (TARP).",
+            _in_words(found, _coverage_in_words),
+        )  # fmt: skip
+        page.figure(
+            f"{kind}_reliability", draw_reliability(found), "Inclusion probabilities against what is on.",
+            _in_words(found, _reliability_in_words),
+        )  # fmt: skip
     page.write(report)
+
+
+def _in_words(found: Mapping[str, Any], of: Callable[[Mapping[str, Any]], str]) -> str:
+    """What a picture shows, for who cannot see it, one way of computing the posterior after the other."""
+    return f"{'; '.join(f'{words}: {of(found[arm])}' for arm, words in ARMS.items())}."
+
+
+def _ranks_in_words(arm: Mapping[str, Any]) -> str:
+    said = []
+    for quantity in ("nuisance", "effect"):
+        r = arm[quantity]
+        outside = sum(not r["low"] <= count <= r["high"] for count in r["counts"])
+        said.append(f"{outside} of {len(r['counts'])} bins of the {quantity}'s ranks outside the band")
+    return ", ".join(said)
+
+
+def _coverage_in_words(arm: Mapping[str, Any]) -> str:
+    c = {k: np.array(v) for k, v in arm["coverage"].items()}
+    off = np.abs(c["coverage"] - c["credibility"])
+    within = (c["low"] <= c["coverage"]) & (c["coverage"] <= c["high"])
+    return f"coverage at most {off.max():.2g} from the credibility, in the band at {within.mean():.0%} of the points"
+
+
+def _reliability_in_words(arm: Mapping[str, Any]) -> str:
+    points = [f"{b['share']:.2g} on of those at {b['mean']:.2g}" for b in arm["inclusion"]["bins"]]
+    return ", ".join(points)
 
 
 HEADER = (

@@ -12,6 +12,7 @@ from ..io.atomic import replace_atomically, whole_folder, write_text
 from . import panels as charts
 
 STYLE = Path(__file__).with_name("page.css")
+LONG = 60  # letters of a cell, from which its column is kept wide where the page is narrow
 CONTENTS = 3  # headings from which on a page has a bar of contents
 
 
@@ -51,7 +52,11 @@ class Page:
             sum(any(c.isalpha() for c in row[n]) for row in rows if n < len(row)) > 0.5 * len(rows)
             for n in range(len(header))
         ]
-        kind = [" class=words" if words else "" for words in lettered]
+        long = [max((len(row[n]) for row in rows if n < len(row)), default=0) > LONG for n in range(len(header))]
+        kind = [
+            (' class="words long"' if far else " class=words") if words else ""
+            for words, far in zip(lettered, long, strict=True)
+        ]
         head = "".join(f"<th scope=col{k}>{html.escape(cell)}</th>" for k, cell in zip(kind, header, strict=True))
         lines = []
         for n, row in enumerate(rows):
@@ -82,8 +87,11 @@ class Page:
         self.parts += [charts.markup(panel, name) for name, panel in charts.numbered(panels, key)]
         self.charts = True
 
-    def figure(self, name: str, drawing, caption: str, result: str = "") -> None:
-        """A matplotlib figure, which is closed afterwards; ``result`` says to who cannot see it what it shows."""
+    def figure(self, name: str, drawing, caption: str, result: str) -> None:
+        """A matplotlib figure, which is closed afterwards; ``result`` says to who cannot see it what it shows.
+
+        Where the page is narrow it keeps a size at which its text can be read, and scrolls.
+        """
         import matplotlib.pyplot as plt
 
         buffer = io.BytesIO()
@@ -92,10 +100,12 @@ class Page:
         data = buffer.getvalue()
         self.images[f"{name}.png"] = data
         image = base64.b64encode(data).decode()
-        text = html.escape(caption)
-        alternative = html.escape(result or caption)
-        picture = f'<img alt="{alternative}" src="data:image/png;base64,{image}">'
-        self.parts.append(f'<figure id="{name}">{picture}<figcaption>{text}</figcaption></figure>')
+        width = int.from_bytes(data[16:20], "big")  # px, of the PNG's header
+        picture = f'<img alt="{html.escape(result)}" style="--width: {width}px" src="data:image/png;base64,{image}">'
+        scroll = f'<div class="scroll" role="region" aria-label="figure: {html.escape(name)}" tabindex="0">'
+        self.parts.append(
+            f'<figure id="{name}">{scroll}{picture}</div><figcaption>{html.escape(caption)}</figcaption></figure>'
+        )
 
     def write(self, path: str | Path) -> None:
         """Write the folder of figures and the page, each whole or not at all.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..faults import FAULT_NAMES
-from .style import GREY, LABELS, PHASE_COLOURS, plt
+from .style import GREY, INK, LABELS, PHASE_COLOURS, plt
 
 
 def coefficient_over_angle(theta: np.ndarray, ratio: np.ndarray, k_prime: np.ndarray, pole_pairs: float):
@@ -60,6 +60,15 @@ def coefficient_over_ratio(
     return figure
 
 
+def coefficient_in_words(k_prime: np.ndarray, line: tuple[float, float], kept: np.ndarray, k0: float) -> str:
+    """What figures 2 and 3 show, for who cannot see them."""
+    return (
+        f"The reconstructed coefficient has a median size of {np.median(np.abs(k_prime)):.3g} V s/rad, nominal "
+        f"{k0:.3g}; {np.mean(kept):.0%} of the samples are kept, and the line through them gives k = {line[0]:.4g} "
+        f"V s/rad and a deviation of the resistance of {line[1]:.3g} ohm."
+    )
+
+
 def signal_by_fault(
     time: np.ndarray, signal: np.ndarray, labels: Sequence[str], ylabel: str, windows: Sequence[tuple[float, float]]
 ):
@@ -88,6 +97,13 @@ def signal_by_fault(
     return figure
 
 
+def signal_in_words(signal: np.ndarray, labels: Sequence[str], unit: str) -> str:
+    """What figures 6 and 7 show, for who cannot see them: the largest of each phase; ``signal`` (run, time, phase)."""
+    peaks = np.abs(signal).max(axis=1)
+    said = [f"{label} {', '.join(f'{p:.3g}' for p in row)}" for label, row in zip(labels, peaks, strict=True)]
+    return f"Largest of phases a, b, c in {unit}: {'; '.join(said)}."
+
+
 def few_row_errors(errors: np.ndarray, width: np.ndarray, title: str):
     """Figure 9: box plot of the absolute error of each variable on the paper's terms, ten fresh rows, over its range.
 
@@ -98,7 +114,7 @@ def few_row_errors(errors: np.ndarray, width: np.ndarray, title: str):
     used = [j for j in range(6) if width[j] > 0.0]
     figure, axes = plt.subplots(figsize=(7.5, 3.8))
     shares = [np.abs(errors[:, j]) / width[j] for j in used]
-    boxes = axes.boxplot(shares, widths=0.5, patch_artist=True, medianprops={"color": "#1d1f21"}, whis=(0, 100))
+    boxes = axes.boxplot(shares, widths=0.5, patch_artist=True, medianprops={"color": INK}, whis=(0, 100))
     for box in boxes["boxes"]:
         box.set(facecolor="#cfe3f1", edgecolor=PHASE_COLOURS[1])
     for place, share in enumerate(shares, 1):
@@ -110,3 +126,9 @@ def few_row_errors(errors: np.ndarray, width: np.ndarray, title: str):
     axes.set_title(title, fontsize=10, loc="left")
     axes.legend(loc="upper right")
     return figure
+
+
+def few_rows_in_words(errors: np.ndarray, width: np.ndarray) -> str:
+    """What figure 9 shows, for who cannot see it; as ``few_row_errors`` takes it."""
+    means = {FAULT_NAMES[j]: float(np.mean(np.abs(errors[:, j])) / width[j]) for j in range(6) if width[j] > 0.0}
+    return f"Mean absolute error over range: {', '.join(f'{c} {m:.3f}' for c, m in means.items())}."

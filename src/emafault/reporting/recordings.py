@@ -22,10 +22,10 @@ def draw_recordings(recordings: Mapping[str, Recording]) -> plt.Figure:
             ax.set_ylabel(label)
         column[0].legend(ncols=3, fontsize=8, loc="upper right")
         column[0].set_title(name, loc="left")
-        column[2].plot(r.time[every], r.rotor_speed[every], lw=0.8, color="#22262b")
+        column[2].plot(r.time[every], r.rotor_speed[every], lw=0.8, color=style.INK)
         column[2].set_ylabel("rotor speed (rad/s)")
         column[3].plot(r.time[every], r.commanded_position[every], lw=1.0, color=style.GREY, label="commanded")
-        column[3].plot(r.time[every], r.output_position[every], lw=1.0, color="#2a9d8f", label="measured")
+        column[3].plot(r.time[every], r.output_position[every], lw=1.0, color=style.AFTER, label="measured")
         column[3].set_ylabel("position (rad)")
         column[3].legend(fontsize=8)
         column[3].set_xlabel("time (s)")
@@ -36,7 +36,7 @@ def draw_motions(motions: Mapping[str, np.ndarray]) -> plt.Figure:
     """Commanded positions (rad) over time (s), a panel each; ``motions`` are (time, 2)."""
     fig, axes = plt.subplots(1, max(1, len(motions)), figsize=(3.8 * max(1, len(motions)), 2.6), squeeze=False)
     for ax, (name, motion) in zip(axes[0], motions.items()):
-        ax.plot(motion[:, 0], motion[:, 1], color="#2a9d8f", lw=1.2)
+        ax.plot(motion[:, 0], motion[:, 1], color=style.AFTER, lw=1.2)
         ax.set_title(name, loc="left")
         ax.set_xlabel("time (s)")
         ax.set_ylabel("position (rad)")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .style import GREY, PHASE_COLOURS, colour, plt, readable_log
+from .style import GREY, INK, PHASE_COLOURS, colour, plt, readable_log
 
 
 def learning_curves(histories: Mapping[str, Sequence[Sequence[Mapping[str, Any]]]]):
@@ -26,7 +26,7 @@ def learning_curves(histories: Mapping[str, Sequence[Sequence[Mapping[str, Any]]
             axes.plot(curve["train"], color=colour(label.split(",")[0].replace(" ", "_")), lw=1, label=names[0])
             axes.plot(curve["validation"], color=PHASE_COLOURS[0], lw=0.9, ls="--", label=names[1])
             best = curve["best_epoch"]
-            axes.plot(best, curve["validation"][best], "o", ms=4, color="#1d1f21", label=names[2])
+            axes.plot(best, curve["validation"][best], "o", ms=4, color=INK, label=names[2])
         axes.set_yscale("log")
         axes.set_xlabel("epoch")
         axes.set_ylabel("mean squared error, standardised")
@@ -35,6 +35,16 @@ def learning_curves(histories: Mapping[str, Sequence[Sequence[Mapping[str, Any]]
     for axes in list(grid.flat)[len(histories) :]:
         axes.set_visible(False)
     return figure
+
+
+def learning_in_words(histories: Mapping[str, Sequence[Sequence[Mapping[str, Any]]]]) -> str:
+    """What the learning curves show, for who cannot see them: those of the first seed."""
+    said = []
+    for label, seeds in histories.items():
+        first = seeds[0][0]
+        best, losses = first["best_epoch"], first["validation"]
+        said.append(f"{label}: validation error from {losses[0]:.2g} to {losses[best]:.2g} at epoch {best}")
+    return f"{'; '.join(said) or 'No network was trained'}."
 
 
 def search_and_front(trials: Sequence[Mapping[str, Any]], chosen: int):
@@ -73,3 +83,14 @@ def search_and_front(trials: Sequence[Mapping[str, Any]], chosen: int):
     readable_log(right.xaxis)
     right.legend()
     return figure
+
+
+def search_in_words(trials: Sequence[Mapping[str, Any]], chosen: int) -> str:
+    """What the picture of the search shows, for who cannot see it."""
+    mine = next(t for t in trials if t["number"] == chosen)
+    least = min(trials, key=lambda t: t["error"])
+    front = sum(bool(t["pareto"]) for t in trials)
+    return (
+        f"The smallest error of {len(trials)} trials is {least['error']:.3g} with {least['parameters']} parameters; "
+        f"the chosen one has {mine['error']:.3g} with {mine['parameters']}. {front} trials are on the Pareto front."
+    )

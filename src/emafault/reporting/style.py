@@ -1,6 +1,7 @@
 """Looks that all figures share."""
 
 import sys
+from collections.abc import Sequence
 
 import matplotlib
 
@@ -10,16 +11,17 @@ if "IPython" not in sys.modules:  # a notebook keeps its own
 import matplotlib.pyplot as plt
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-#: one colour a reconstruction; others take the remaining ones in turn
+#: one colour a reconstruction, told apart by the colour-blind: Okabe and Ito, https://jfly.uni-koeln.de/color/, 2008
 COLOURS = {
-    "paper": "#b5651d",
-    "weighted": "#4c78a8",
-    "weighted_floating": "#2a9d8f",
-    "angle_resolved": "#7b5ea7",
-    "nine": "#c2185b",
-    "nine_heating": "#e39a2d",
+    "paper": "#d55e00",
+    "weighted": "#0072b2",
+    "weighted_floating": "#009e73",
+    "angle_resolved": "#cc79a7",
+    "nine": "#1d1f21",
+    "nine_heating": "#e69f00",
 }
-PHASE_COLOURS = ("#d1495b", "#2e86ab", "#3d9970")
+PHASE_COLOURS = ("#d55e00", "#0072b2", "#1d1f21")
+BEFORE, AFTER, INK = "#c04f00", "#0072b2", "#1d1f21"  # as the style sheet of a page has them
 GREY = "#8a8a8a"
 LABELS = {"Na": "$N_a$", "Nb": "$N_b$", "Nc": "$N_c$", "xi_x": r"$\xi_x$", "xi_y": r"$\xi_y$", "dT": r"$\Delta T$ (K)"}
 
@@ -36,6 +38,13 @@ plt.rcParams.update(
         "legend.frameon": False,
     }
 )
+
+
+def ink_on(background: Sequence[float]) -> str:
+    """Black or white, whichever stands out more of a colour (red, green, blue; 0 to 1), by 4.5 times at least."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in background]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return "#000000" if (luminance + 0.05) ** 2 > 0.05 * 1.05 else "#ffffff"  # equal contrast to both
 
 
 def readable_log(axis) -> None:

@@ -105,7 +105,7 @@ def draw_commands(
     page.paragraph("Which command, length and load identify best within limits, by nine features?", "lead")
     page.paragraph(_said(entries))
     page.heading("Bound and errors by length of recording")
-    page.figure("lengths", figures_of.lengths(entries, ROLES), _CAPTION)
+    page.figure("lengths", figures_of.lengths(entries, ROLES), _CAPTION, _lengths_in_words(entries))
     header = ["length (s)", "", "design", "N", "over bound", "ξ", "over bound", "ΔT (K)", "over bound", "coverage"]
     page.table(header, [_row(entry) for entry in entries])
     text = (
@@ -134,8 +134,28 @@ def draw_commands(
     signals = {ROLES[e["role"]]: judge.simulate(design_of(e["design"])) for e in drawn}
     page.heading("Signals")
     text = "Position, speed and current of phase a under these commands, of the first fault vector, without noise."
-    page.figure("signals", figures_of.signals(signals, judge.interval), text)
+    page.figure("signals", figures_of.signals(signals, judge.interval), text, _signals_in_words(signals))
     page.write(output)
+
+
+def _lengths_in_words(entries: Sequence[Mapping[str, Any]]) -> str:
+    """What the picture of errors over lengths shows, for who cannot see it."""
+    said = []
+    for e in (e for e in entries if not e["breaches"]):
+        own = [f"{w} {e['errors'][n]:.2g} (bound {e['bound'][n]:.2g})" for n, w in figures_of.OUTPUTS.items()]
+        said.append(f"{ROLES[e['role']]}, {e['design']['length']:g} s: {', '.join(own)}")
+    return f"Mean absolute errors. {'; '.join(said) or 'Every command breaks a limit'}."
+
+
+def _signals_in_words(signals: Mapping[str, Mapping[str, np.ndarray]]) -> str:
+    """What the picture of signals shows, for who cannot see it."""
+    said = [
+        f"{role}: travel {np.ptp(s['output_position'][0]):.2g} rad, speed up to "
+        f"{np.abs(s['rotor_speed'][0]).max():.3g} rad/s, current of phase a up to "
+        f"{np.abs(s['phase_current'][0, :, 0]).max():.2g} A"
+        for role, s in signals.items()
+    ]
+    return f"{'; '.join(said)}."
 
 
 _CAPTION = (

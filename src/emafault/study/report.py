@@ -85,7 +85,9 @@ def draw_report(
         if history["curves"]:
             curves[named(folder.parent.name, folder.name)] = history["curves"]
     text = "Learning curves of the first pass, which stops after the failed validation checks asked for."
-    page.figure("learning_curves", search_figures.learning_curves(curves), text)
+    page.figure(
+        "learning_curves", search_figures.learning_curves(curves), text, search_figures.learning_in_words(curves)
+    )
     if search:
         trials, chosen = (read_json(path) for path in search)
         text = (
@@ -94,7 +96,8 @@ def draw_report(
             f"{chosen['network']['activation']} units on {chosen['network']['coordinates']} features, "
             f"{chosen['parameters']} parameters."
         )
-        page.figure("search", search_figures.search_and_front(trials, chosen["number"]), text)
+        of = trials, chosen["number"]
+        page.figure("search", search_figures.search_and_front(*of), text, search_figures.search_in_words(*of))
     best = _best(results)
     key = f"{best['method']}.{best['estimator']}"
     parts = [found[f"{key}.{kind}"] for kind in ("value", "low", "high", "truth")]
@@ -102,7 +105,7 @@ def draw_report(
     page.heading("Estimates")
     label = named(best["method"], best["estimator"])
     text = f"{label}: what is identified less what was seeded, with {level:.0%} intervals, on 100 fresh runs."
-    page.figure("estimates", error_figures.residuals_over_truth(*parts), text)
+    page.figure("estimates", error_figures.residuals_over_truth(*parts), text, error_figures.residuals_in_words(*parts))
     page.heading("What this rests on")
     page.paragraph(CHOICES)
     page.preformatted(Path(configuration).read_text())
@@ -235,7 +238,8 @@ def _errors(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray
         "Absolute errors on fresh rows: box from 25 to 75 %, whiskers from 5 to 95 %, diamond the mean, dashed the "
         f"mean absolute error at the Cramér-Rao bound, {BOUND_OF[best['bound']]}."
     )
-    page.figure("errors", error_figures.error_boxes(errors, _bound_of(table, best)), text)
+    of_best = errors, _bound_of(table, best)
+    page.figure("errors", error_figures.error_boxes(*of_best), text, error_figures.errors_in_words(*of_best))
 
 
 def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.ndarray], shown) -> None:
@@ -244,14 +248,15 @@ def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.
     angle, ratio, k_prime = (shown[name].values for name in ("angle", "ratio", "k_prime"))
     text = "Figure 2: k_a of the paper's worked example, reconstructed with nominal resistance, over angle and i/ω."
     drawing = paper_figures.coefficient_over_angle(angle, ratio, k_prime, shown.attrs["pole_pairs"])
-    page.figure("figure_2", drawing, text)
     line, k0 = (shown.attrs["level"], shown.attrs["slope"]), shown.attrs["nominal_back_emf"]
+    result = paper_figures.coefficient_in_words(k_prime, line, kept, k0)
+    page.figure("figure_2", drawing, text, result)
     text = (
         "Figure 3: the same over i/ω, not optimised. Right: the samples that are kept, with the straight line whose "
         "slope is the deviation of the resistance from nominal."
     )
     drawing = paper_figures.coefficient_over_ratio(ratio, k_prime, line, kept, k0)
-    page.figure("figure_3", drawing, text)
+    page.figure("figure_3", drawing, text, result)
     time = shown["time"].values
     end = float(time[-1])
     windows = [(0.0, min(0.12, end)), (max(0.0, end - 0.06), end)]
@@ -260,7 +265,8 @@ def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.
         label = f"{name} ({unit})"
         drawing = paper_figures.signal_by_fault(time, shown[name].values[1:], labels, label, windows)
         text = f"Figure {number}: phase {name}s for different faults, at the start and at the end of the record."
-        page.figure(f"figure_{number}", drawing, text)
+        result = paper_figures.signal_in_words(shown[name].values[1:], labels, unit)
+        page.figure(f"figure_{number}", drawing, text, result)
     width = np.array([table["width"][name] for name in FAULT_NAMES])
     own = [r for r in table["results"] if r["method"] == "paper" and r["estimator"] == "network"]
     networks = [r for r in table["results"] if r["estimator"] in ("network", "searched")]
@@ -271,7 +277,8 @@ def _paper_figures(page: Page, table: Mapping[str, Any], found: Mapping[str, np.
         label = named(entry["method"], entry["estimator"])
         drawing = paper_figures.few_row_errors(error, width, f"{label}: first ten fresh rows")
         text = "Figure 9: error of each variable on ten rows never seen in training, over the variable's range."
-        page.figure(f"figure_9_{entry['method']}_{entry['estimator']}", drawing, text)
+        result = paper_figures.few_rows_in_words(error, width)
+        page.figure(f"figure_9_{entry['method']}_{entry['estimator']}", drawing, text, result)
 
 
 def compare_variants(
@@ -312,9 +319,10 @@ def compare_variants(
             lines[output_name]["bound"] = [bound[output_name] for bound in bounds]
     page = Page(title, figures)
     page.paragraph(question, "lead")
-    page.paragraph(_ranking(names, lines))
+    result = _ranking(names, lines)
+    page.paragraph(result)
     text = "Mean absolute errors on fresh rows, by variant."
-    page.figure("variants", error_figures.variants(names, lines), text)
+    page.figure("variants", error_figures.variants(names, lines), text, result)
     for output_name, (label, _, digits) in OUTPUTS.items():
         page.heading(f"Mean absolute error of {label}")
         columns = list(lines[output_name])

@@ -1,6 +1,6 @@
 """One fault from several recordings of a unit: error and bound over their number, by six and by nine features."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +124,7 @@ def draw_several(spec: Mapping[str, Any], found: str, output: str | Path, figure
         page.heading(own["name"])
         page.paragraph(own["question"])
         text = "Mean absolute errors (dots) and bound (lines) over the number of recordings; a temperature for each."
-        page.figure(own["name"], figures_of.over_count(mine), text)
+        page.figure(own["name"], figures_of.over_count(mine), text, _in_words(mine))
         header = ["features", "recordings", "N", "over bound", "ξ", "over bound", "ΔT (K)", "over bound", "coverage"]
         page.table(header, [_row(entry) for entry in mine])
     text = (
@@ -134,6 +134,21 @@ def draw_several(spec: Mapping[str, Any], found: str, output: str | Path, figure
     )
     page.paragraph(text, "small")
     page.write(output)
+
+
+def _in_words(entries: Sequence[Mapping[str, Any]]) -> str:
+    """What the picture shows, for who cannot see it: from the fewest recordings to the most."""
+    said = []
+    for features in METHODS:
+        own = sorted((e for e in entries if e["features"] == features), key=lambda e: e["count"])
+        if own:
+            first, last = own[0], own[-1]
+            errors = [
+                f"{label} {first['errors'][n]:.2g} to {last['errors'][n]:.2g} (bound {last['bound'][n]:.2g})"
+                for n, label in figures_of.OUTPUTS.items()
+            ]
+            said.append(f"{features} features, {first['count']} to {last['count']} recordings: {', '.join(errors)}")
+    return f"Mean absolute error. {'. '.join(said)}."
 
 
 def _row(entry: Mapping[str, Any]) -> list[str]:
