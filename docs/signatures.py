@@ -66,21 +66,21 @@ class Picture:
 
 @cache
 def machine() -> ReferenceActuator:
-    """The nominal actuator with its recording, as it is and at other soak temperatures."""
+    """The nominal actuator with its recording, as it is and at other ambient temperatures."""
     composed = config.compose(overrides=["command=sine", "sensors=ideal"])
     spec, recording, settings = config.diagnosis_spec(composed), composed["recording"], dict(composed["command"])
     actuator, noise = ActuatorParameters(**spec["actuator"]), SensorNoise(**spec["sensors"])
     duration, interval = recording["duration"], recording["interval"]
     command = command_positions(settings.pop("name"), settings, duration, actuator.control_period)
     signals = simulate(make_runs(actuator, np.zeros((1, 6))), command, duration, interval)
-    soak = actuator.reference_temperature
+    ambient = actuator.reference_temperature
     recorded = Recording(
-        time=time_axis(duration, interval), ambient_temperature=soak,
+        time=time_axis(duration, interval), ambient_temperature=ambient,
         attributes={"health": "healthy", "command": "sine"},
         **{name: values[0] for name, values in signals.items()},
     )  # fmt: skip
     plain = Signals.of("plain", recorded, actuator, noise)
-    temperatures = soak + WARMEST * np.linspace(-1.0, 1.0, 9)
+    temperatures = ambient + WARMEST * np.linspace(-1.0, 1.0, 9)
     warm = {f"{t:g}": replace(plain, name=f"{t:g}", ambient=float(t)) for t in temperatures}
     return ReferenceActuator(actuator, {"plain": plain, **warm})
 

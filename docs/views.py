@@ -33,7 +33,7 @@ AXES = {
     "current_change": "change of the phase current in the interval (A)",
     "voltage": "phase voltage (V)",
     "bus_current": "current of the bus (A)",
-    "temperature": "soak temperature (degC)",
+    "temperature": "ambient temperature (degC)",
     "edge": "electrical angle from the edge (degrees)",
     "carried": "rotor angle over the gear ratio (rad)",
 }

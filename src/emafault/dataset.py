@@ -275,7 +275,7 @@ def _create(file, spec: Mapping[str, Any], runs: int, samples: int) -> None:
         variable = file.createVariable(name, "f4", dims, chunksizes=chunk, fill_value=False, **storage)
         variable.units, variable.long_name = unit, long_name
     ambient = file.createVariable("ambient_temperature", "f8", ("run",), fill_value=False)
-    ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
+    ambient.units, ambient.long_name = "degC", "measured ambient temperature, which the winding starts at"
     fault = file.createVariable("fault", "f8", ("run", "component"), fill_value=False)
     fault.long_name = "fault vector; Na, Nb, Nc, xi_x, xi_y (1), dT (K)"
     file.setncatts(

@@ -165,9 +165,9 @@ DAMAGES: dict[str, tuple[Prepare, tuple[str, ...]]] = {
         damaged(lambda r: replace(r, phase_current=-r.phase_current, phase_current_end=-r.phase_current_end)),
         (),
     ),
-    "soaked at 1e4 degC": (damaged(lambda r: replace(r, ambient_temperature=1e4)), ("ambient_temperature",)),
-    "soaked below absolute zero": (damaged(lambda r: replace(r, ambient_temperature=-300.0)), ("ambient_temperature",)),
-    "soaked at NaN": (damaged(lambda r: replace(r, ambient_temperature=np.nan)), ("ambient_temperature",)),
+    "ambient at 1e4 degC": (damaged(lambda r: replace(r, ambient_temperature=1e4)), ("ambient_temperature",)),
+    "ambient below 0 K": (damaged(lambda r: replace(r, ambient_temperature=-300.0)), ("ambient_temperature",)),
+    "ambient at NaN": (damaged(lambda r: replace(r, ambient_temperature=np.nan)), ("ambient_temperature",)),
     "ambient with an axis": (
         edited(lambda f: (f.renameVariable("ambient_temperature", "x"), _ambient(f, ("phase",)))),
         ("ambient_temperature has dimensions",),

@@ -35,10 +35,10 @@ def record(
     positions = command_positions(command, settings, duration, actuator.control_period)
     signals = simulate(runs, positions, duration, interval)
     signals = signals if clean else measure(signals, runs, NOISE, 100 + seed)
-    soak = float(signals.pop("ambient_temperature", [ambient])[0])
+    measured = float(signals.pop("ambient_temperature", [ambient])[0])
     return Recording(
         time=time_axis(duration, interval),
-        ambient_temperature=soak,
+        ambient_temperature=measured,
         fault=fault,
         attributes={"health": health, "command": command, "unit": "unit 7"},
         **{name: values[0] for name, values in signals.items()},

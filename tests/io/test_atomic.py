@@ -34,9 +34,9 @@ def test_a_page_shows_its_figures_all_at_once(tmp_path):
     import matplotlib.pyplot as plt
 
     page = Page("title", tmp_path / "figures")
-    page.figure("one", plt.figure(), "a figure")
+    page.figure("one", plt.figure(), "a figure", "what it shows")
     shutil.rmtree(tmp_path / "figures", ignore_errors=True)  # by the next run
-    page.figure("two", plt.figure(), "a figure")
+    page.figure("two", plt.figure(), "a figure", "what it shows")
     assert not (tmp_path / "figures").exists()
     page.write(tmp_path / "report.html")
     assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == ["one.png", "two.png"]

@@ -111,8 +111,8 @@ class Chain:
         time = (np.arange(len(theta)) + part) * self.interval
         current = 0.5 * np.abs(true["phase_current"]).sum(axis=1)
         turned = (at - p["theta_0"]) / p["gear_ratio"]
-        soak = float(p["reference_temperature"] + p["dT"])
-        return followed(row, time, at, np.ascontiguousarray(true["rotor_speed"]), current, turned, soak)
+        ambient = float(p["reference_temperature"] + p["dT"])
+        return followed(row, time, at, np.ascontiguousarray(true["rotor_speed"]), current, turned, ambient)
 
     def _swept(self, true: Signals, j: int) -> np.ndarray:
         """(time,) mean of speed times the trapezoid of phase j (rad/s)."""

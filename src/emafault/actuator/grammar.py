@@ -28,7 +28,7 @@ FACTORS = {
 }  # fmt: skip
 PLACES = MACHINE | CHANNELS | FACTORS
 #: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
-#: of the magnitudes), the angle turned since the start over the gear ratio, time, the soak temperature
+#: of the magnitudes), the angle turned since the start over the gear ratio, time, the initial winding temperature
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
 #: of a memory: (current / 2)^2 (A2), magnitude of the speed over 100 rad/s, one from the start of the recording
 SOURCES = ("loss", "speed", "start")

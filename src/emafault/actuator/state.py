@@ -164,8 +164,8 @@ def hold_terms(p, s, terms, table, ends_at):
     half = 0.5 * (s.held_until - s.t)
     theta = s.theta + half * w
     turned = (theta - p.theta_0) / p.gear_ratio
-    soak = p.reference_temperature + p.dT
-    add_up(terms, s.t + half, theta, w, current, turned, soak, memory, table, added)
+    ambient = p.reference_temperature + p.dT
+    add_up(terms, s.t + half, theta, w, current, turned, ambient, memory, table, added)
     torque = added[AT_TORQUE]
     if added[AT_TORQUE_CONSTANT] != 0.0:
         cell, into = s.cell, p.pole_pairs * s.theta - s.turns * TWO_PI - s.edge[s.cell]

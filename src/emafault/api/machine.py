@@ -46,12 +46,12 @@ class MachineDiagnosis(Told):
         return Table(["parameter", "before", "after", "low", "high", "unit"], rows)
 
     def next_recordings(self) -> Table:
-        """A row a recording that tells more: what it tells apart and the expected odds; empty where none would."""
+        """A row a recording that tells more: what it distinguishes, expected Bayes factor; empty where none would."""
         rows = [
             [e["command"], " from ".join(e["separates"]), e["expected_odds"]]
             for e in self._found.verdict["next_experiment"]
         ]
-        return Table(["recording", "tells", "expected odds"], rows)
+        return Table(["recording", "distinguishes", "expected Bayes factor"], rows)
 
     def __repr__(self) -> str:
         return "\n".join([f"Diagnosis of {shown(self._found.verdict['bench'])}: {self.kind}", *self.sentences])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Plan:
-    """Recordings that tell the readings of a bench apart which are left, the most telling first."""
+    """Recordings that distinguish the explanations of a bench that are left, the most decisive first."""
 
     def __init__(self, entries: Sequence[Mapping[str, Any]]) -> None:
         self.entries = [dict(entry) for entry in entries]
@@ -29,12 +29,12 @@ class Plan:
         return {f"{n}_{e['motion']['name']}": planning.motion_of(e) for n, e in enumerate(self.entries, start=1)}
 
     def table(self) -> Table:
-        """A row a recording: command, soak temperature (degC), what it tells apart and the expected odds."""
+        """A row a recording: command, ambient temperature (degC), what it distinguishes, expected Bayes factor."""
         rows = [
             [e["command"], e["ambient_temperature"], planning.separated(e["separates"]), e["expected_odds"]]
             for e in self.entries
         ]
-        return Table(["command", "soak (degC)", "tells", "expected odds"], rows)
+        return Table(["command", "ambient (degC)", "distinguishes", "expected Bayes factor"], rows)
 
     def plot(self) -> "Figure":
         """The commanded positions over time."""
@@ -62,7 +62,7 @@ def plan(
     source: str | Path | Diagnosis | Recording | Mapping[str, Recording] | Sequence[Recording],
     actuator: Actuator | None = None,
 ) -> Plan:
-    """What to record next, as ``emafault plan`` tells.
+    """What to record next, as ``emafault plan`` says.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ class Recordings(Mapping[str, Recording]):
         return len(self._recordings)
 
     def table(self) -> Table:
-        """A row a recording: duration (s), interval (s), soak temperature (degC), health, command, largest values."""
-        columns = ["recording", "duration (s)", "interval (s)", "soak (degC)", "health", "command",
+        """A row a recording: duration and interval (s), ambient temperature (degC), health, command, largest values."""
+        columns = ["recording", "duration (s)", "interval (s)", "ambient (degC)", "health", "command",
                    "largest speed (rad/s)", "largest current (A)"]  # fmt: skip
         rows = [
             [

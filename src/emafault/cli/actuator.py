@@ -60,7 +60,7 @@ def _identify(args: argparse.Namespace) -> None:
     for note in found.notes:
         print(f"note: {note}")
     for name in found.kept:
-        print(f"{name}: these recordings do not tell it; that of the file stays", file=sys.stderr)
+        print(f"{name}: these recordings do not determine it; that of the file stays", file=sys.stderr)
     write_text(out, completed(sheet, found.machine, len(files)))
     print(f"written to {out}")
 

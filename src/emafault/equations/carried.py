@@ -1,7 +1,7 @@
 """What a diagnosis describes, as entries of ``unlisted`` in a configuration, which both simulators have.
 
-What cannot be an entry is None: an undescribed remainder, spikes, whose size is not told, and a resistance of the bus
-that changes.
+What cannot be an entry is None: an undescribed remainder, spikes, whose size is not estimated, and a resistance of the
+bus that changes.
 """
 
 from collections.abc import Mapping, Sequence

@@ -29,7 +29,7 @@ RIVALS = 4
 PROPOSED = 3
 LARGEST_ODDS = 1e6
 NEXT = "next"
-#: command, its settings, length (s), soak temperatures (degC); for a shaft that turns at 1 rad/s at most and by 0.5 rad
+#: command, its settings, length (s), ambient (degC); for a shaft that turns at 1 rad/s at most and by 0.5 rad
 #: to either side
 MENU: tuple[tuple[str, Mapping[str, float], float, tuple[float, ...]], ...] = (
     ("parabolic", {"acceleration": 0.6}, 0.6, (20.0,)),

@@ -23,7 +23,7 @@ TIMING = 0.5  # of a control period, by which samples and means within it may be
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
-SOAK = 0.5  # K, of the measured ambient temperature
+AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
@@ -36,7 +36,7 @@ UNITS = {"flexibility": "rad/(N m)"}
 def nuisances(
     a: ActuatorParameters, catalogue: Mapping[str, Effect], recordings: Mapping[str, Signals]
 ) -> dict[str, Parameter]:
-    """What is free whatever the cause: tolerances, settings of the controller, soak temperatures, the fault vector."""
+    """What is free whatever the cause: tolerances, settings of the controller, temperatures, the fault vector."""
     out: dict[str, Parameter] = {}
     for effect in catalogue.values():
         for name, p in effect.parameters.items():
@@ -66,7 +66,7 @@ def nuisances(
         out[full] = Parameter(full, 0.0, 0.0, EDGE, "rad")
     unknown = False
     for name, rec in recordings.items():
-        out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, SOAK, "K")
+        out[f"dT@{name}"] = Parameter(f"dT@{name}", 0.0, 0.0, AMBIENT, "K")
         for channel in ("voltage", "current"):
             full = f"skew.{channel}@{name}"
             out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")

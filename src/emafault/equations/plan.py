@@ -56,7 +56,7 @@ def sentences(entries: Sequence[Mapping[str, Any]]) -> list[str]:
         f"{n}. {entry['command']}, ambient temperature {entry['ambient_temperature']:g} degC: distinguishes "
         f"{separated(entry['separates'])}, expected Bayes factor {entry['expected_odds']:.3g}"
         for n, entry in enumerate(entries, start=1)
-    ] or ["Nothing to record: no other reading of these recordings is left."]
+    ] or ["Nothing to record: no other explanation of these recordings is left."]
 
 
 def write_motions(entries: Sequence[Mapping[str, Any]], folder: str | Path, force: bool = True) -> list[Path]:

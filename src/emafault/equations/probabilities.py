@@ -69,7 +69,7 @@ def basis(told: Mapping[str, Any]) -> str:
             return f"{head}blind cases of this actuator, the reference actuator."
         return f"{head}blind cases of the {told['actuator']}, not on this one; snakemake calibration does that."
     error, false = told["error"], told["false_names"]
-    verdict = "they hold as far as that tells" if told["hold"] else "they do not hold"
+    verdict = "they hold as far as that shows" if told["hold"] else "they do not hold"
     return (
         f"{head}{told['cases']} blind cases of {told['actuator']}: {verdict} (calibration error "
         f"{error['value']:.2g}, {error['low']:.2g} to {error['high']:.2g}; {false['named']} of {false['cases']} "

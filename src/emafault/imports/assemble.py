@@ -54,7 +54,7 @@ def recording_of(
         phase_voltage, misfit, _ = with_modelled_star(phase_voltage, means["phase_current"], rate, turned)
         raw.lost.append(
             f"the star point was not measured: it is modelled from the line voltages, missed by {misfit:.2g} V there; "
-            "what moves the star point alone cannot be told"
+            "what moves the star point alone cannot be determined"
         )
     if raw.off is not None and raw.off.any():
         part = 0.5 * actuator.bus_voltage * three["phase_voltage"][0].step / interval
@@ -72,7 +72,9 @@ def recording_of(
     if bus is None:
         raw.lost.append("no bus voltage: the supply cannot be judged")
     if "rotor_speed" not in raw.single:
-        raw.lost.append("no rotor_speed: it is the rate of rotor_angle, and a fault of a speed sensor cannot be told")
+        raw.lost.append(
+            "no rotor_speed: it is the rate of rotor_angle, and a fault of a speed sensor cannot be detected"
+        )
     speed = raw.single["rotor_speed"].means(edges) if "rotor_speed" in raw.single else np.diff(angle) / interval
     return Recording(
         time=interval * np.arange(1, count + 1),

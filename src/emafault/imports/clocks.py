@@ -55,7 +55,7 @@ def align(raw: Raw, logger: str, first: str, star, actuator: ActuatorParameters,
     step = max(s.step for s in raw.signals() if s.logger == logger)
     known = max(_width(misfit, skew, drift, step), least)
     raw.lost.append(
-        f"the clock of {logger} is found to {1e6 * known:.0f} us: a lag of that between the loggers is not told"
+        f"the clock of {logger} is found to {1e6 * known:.0f} us: a lag of that between the loggers is not detected"
     )
     raw.change(lambda s: s.on_clock(skew, drift) if s.logger == logger else s)
     return finding

@@ -1,4 +1,4 @@
-"""Phase order, signs, direction and pole pairs at once: the voltage equation under every reading of the channels.
+"""Phase order, signs, direction and pole pairs at once: the voltage equation under every order of the channels.
 
 In space vectors x = (2/3) sum_j x_j exp(i 2 pi j/3), in which the star point drops out,
 

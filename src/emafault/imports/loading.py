@@ -85,7 +85,7 @@ def _load_one(given: Mapping[str, Any], entry: Mapping[str, Any], pole_pairs: in
             raw.single[name] = angle_of_halls(raw.name, halls, pole_pairs)
             raw.lost.append(
                 "rotor_angle is interpolated between hall edges: what turns with the rotor (cogging, eccentricity, "
-                "an angle's ripple) cannot be told"
+                "an angle's ripple) cannot be detected"
             )
         else:
             signal = channel(spec["channel"], wanted, spec, name in ("rotor_speed", "bus_voltage"), name)

@@ -22,22 +22,22 @@ def draw(result: "Imported", given: Mapping[str, Any]) -> Page:
     page.paragraph(f"{count} recording{'s' if count > 1 else ''} at an interval of {given['interval']}.", "lead")
     page.heading("Found from the data")
     page.paragraph(
-        "The margin is the misfit (mean square) of the next best reading over that of the one taken; what "
+        "The margin is the misfit (mean square) of the next best interpretation over that of the one taken; what "
         "changed a signal is set off."
     )
     page.table(
-        ("what", "taken", "margin", "next best"),
+        ("quantity", "taken", "margin", "next best"),
         [(f.what, f.taken, f"{f.margin:.3g}", f.other) for f in result.findings],
         [k for k, f in enumerate(result.findings) if f.changed],
     )
-    page.heading("Said by the map alone")
+    page.heading("Taken from the map")
     reference = given["signals"]["phase_voltage"]["reference"].replace("_", " ")
     page.paragraph(f"Voltages are measured against: {reference}.")
     page.table(
         ("recording", "health", "ambient", "files"),
         [(e["name"], e["health"], str(e["ambient"]), " ".join(e["files"].values())) for e in given["recordings"]],
     )
-    page.heading("What these recordings cannot tell")
+    page.heading("What these recordings do not determine")
     for name, lost in result.lost.items():
         for text in dict.fromkeys(lost):
             page.paragraph(f"{name}: {text}.")

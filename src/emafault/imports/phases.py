@@ -115,7 +115,7 @@ def apply_phases(
         direction *= -1 if turn(direction) else 1
     elif not free or (not odd and len(free) > 1):
         raise InputError(
-            f"{margin[ORDER].text()}: which of both has the right names the data cannot tell; say "
+            f"{margin[ORDER].text()}: which of the two has the right names the data do not show; say "
             "signals.phase_voltage.order or signals.phase_current.order"
         )
     else:

@@ -132,7 +132,9 @@ def _set_zero(raw: Raw, given: Mapping[str, Any], fitted: Electrical, pole_pairs
                 "take it out, or put it right"
             )
     else:
-        raw.lost.append("the angle's electrical zero is that of the voltages: a displaced angle sensor cannot be told")
+        raw.lost.append(
+            "the angle's electrical zero is that of the voltages: a displaced angle sensor cannot be detected"
+        )
     raw.single["rotor_angle"] = raw.single["rotor_angle"].scaled(1.0, -zero / pole_pairs)
     return Finding(f"{raw.name}: electrical zero", words, fitted.margin, "no back-EMF that turns with the rotor")
 

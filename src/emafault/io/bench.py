@@ -158,7 +158,7 @@ def limits(recordings: Mapping[str, Recording], actuator: ActuatorParameters) ->
         if step[step > COARSE].sum() > 0.5 * step.sum():
             say(
                 f"{n}: fewer than two samples in a commutation sector through most of the motion: the electrical "
-                "equations of this recording tell little",
+                "equations of this recording determine little",
                 n,
                 "time",
             )

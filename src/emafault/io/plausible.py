@@ -61,7 +61,7 @@ def refuse_other_actuator(path: str, recording: Recording, actuator: ActuatorPar
         apart = abs(np.log(mine / told))
         if apart > (1e-6 if name in ("pole_pairs", "gear_ratio") else SAME_DESIGN):
             raise InputError(
-                f"{path}: was recorded on another actuator, with {name} {mine:.4g} where {told:.4g} is told; name its "
+                f"{path}: was recorded on another actuator, with {name} {mine:.4g} where {told:.4g} is given; name its "
                 "own file by --actuator, or its numbers as actuator.KEY=VALUE"
             )
 
@@ -246,7 +246,7 @@ def _refuse_pole_pairs(path: str, recording: Recording, actuator: ActuatorParame
         if found is not None and OF_K[0] < abs(found.K) / (FUNDAMENTAL * actuator.back_emf) < OF_K[1]:
             told = actuator.pole_pairs
             raise InputError(
-                f"{path}: the back-EMFs turn {pole_pairs} times with the rotor, told are {told} pole_pairs"
+                f"{path}: the back-EMFs turn {pole_pairs} times with the rotor, given are {told} pole_pairs"
             )
 
 

@@ -64,7 +64,7 @@ class Recording:
 
     def __repr__(self) -> str:
         samples = f"{len(self.time)} samples of {self.interval:g} s"
-        return f"Recording {self.name}: {samples}, {self.health}, soaked at {self.ambient_temperature:.1f} degC"
+        return f"Recording {self.name}: {samples}, {self.health}, ambient at {self.ambient_temperature:.1f} degC"
 
     @property
     def health(self) -> str:
@@ -101,7 +101,7 @@ def write_recording(path: str | Path, recording: Recording) -> None:
                 variable.setncatts(recording.known.get(name, {}))
                 variable[:] = values.T if phased else values
             ambient = file.createVariable("ambient_temperature", "f8", ())
-            ambient.units, ambient.long_name = "degC", "measured soak temperature before the recording"
+            ambient.units, ambient.long_name = "degC", "measured ambient temperature, which the winding starts at"
             ambient[...] = recording.ambient_temperature
             if recording.fault is not None:
                 file.createDimension("component", 6)

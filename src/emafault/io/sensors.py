@@ -29,7 +29,7 @@ LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sam
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
 OF_SPEED, OF_GEAR = (0.4, 2.5), (0.85, 1.18)  # slopes with which signals that are one quantity may go together
-TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may be soaked at
+TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may have at the start
 
 
 # --- sensors that are not what the file says -------------------------------------------------------------------------

@@ -79,7 +79,7 @@ def calibrate(
     Parameters
     ----------
     features : of the healthy recordings, one run each
-    ambient_temperature : (run,) measured soak temperature (degC)
+    ambient_temperature : (run,) measured ambient temperature, which the winding starts at (degC)
     ambient_error : its standard deviation (K)
     alpha_m : temperature coefficient of the magnets, at the winding's temperature (1/K)
     healthy_within : largest N and xi that still count as healthy, taken as uniform (1)

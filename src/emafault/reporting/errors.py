@@ -71,8 +71,8 @@ def residuals_over_truth(value: np.ndarray, low: np.ndarray, high: np.ndarray, t
             )
         axes.axhline(0.0, color=GREY, lw=0.8, zorder=0)
         axes.set_title(LABELS[FAULT_NAMES[j]], loc="left")
-        axes.set_xlabel("seeded")
-        axes.set_ylabel("identified less seeded")
+        axes.set_xlabel("true value")
+        axes.set_ylabel("estimate minus true value")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure

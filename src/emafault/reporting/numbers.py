@@ -80,7 +80,7 @@ def add_numbers(page: Page, found: Numbers, level: int = 2) -> None:
         "probability of 90 %, within the model. Where these recordings determine a number little, its interval is "
         f"wider than {100 * TOLD:.0f} % of what was known before, and it stays near its start."
     )
-    header = ["number", "what of", "start", "fitted", "90 % interval", "unit", "determined by these recordings"]
+    header = ["number", "belongs to", "start", "fitted", "90 % interval", "unit", "determined by these recordings"]
     own = [n for n in found.numbers if n.kind == "recording"]
     page.table(header, [_row(n) for n in found.numbers if n.kind != "recording"])
     if own:

@@ -1,8 +1,8 @@
 """The bound of a unit that is calibrated: the information of its healthy recordings beside that of the recording.
 
 The healthy recordings bound the unit's R0 and k0 (and L0) at the reference temperature as the recording itself bounds
-R and k: by the Cramer-Rao covariance of their own noise-free signals, with the error of the ambient temperature at
-which they were soaked and what is known of any unit beforehand (``calibrate``). That covariance is added to the
+R and k: by the Cramer-Rao covariance of their own noise-free signals, with the error of the measured ambient
+temperature and what is known of any unit beforehand (``calibrate``). That covariance is added to the
 recording's, relative to each coefficient. Simulated healthy units are exactly healthy, which no estimator knows.
 """
 

@@ -73,7 +73,7 @@ def _changes(page: Page, units: Mapping[str, Sequence[Mapping[str, Any]]]) -> No
     for unit, history in units.items():
         for before, after in pairwise(history):
             told = "; ".join(change.sentence() for change in changes(before, after))
-            lines.append((unit, f"{_when(before)} to {_when(after)}", told or "nothing that is told"))
+            lines.append((unit, f"{_when(before)} to {_when(after)}", told or "nothing reported"))
     if not lines:
         page.paragraph("No unit has a second bench.")
         return

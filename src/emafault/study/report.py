@@ -104,7 +104,7 @@ def draw_report(
     level = table["level"]
     page.heading("Estimates")
     label = named(best["method"], best["estimator"])
-    text = f"{label}: what is identified less what was seeded, with {level:.0%} intervals, on 100 fresh runs."
+    text = f"{label}: estimate minus true value, with {level:.0%} intervals, on 100 fresh runs."
     page.figure("estimates", error_figures.residuals_over_truth(*parts), text, error_figures.residuals_in_words(*parts))
     page.heading("What this rests on")
     page.paragraph(CHOICES)

@@ -118,7 +118,9 @@ def draw_several(spec: Mapping[str, Any], found: str, output: str | Path, figure
     """
     entries = read_json(found)
     page = Page("several_recordings", figures)
-    page.paragraph("What do several recordings of one fault tell together, each at a temperature of its own?", "lead")
+    page.paragraph(
+        "What do several recordings of one fault determine together, each at a temperature of its own?", "lead"
+    )
     for own in spec["experiments"]:
         mine = [entry for entry in entries if entry["experiment"] == own["name"]]
         page.heading(own["name"])

@@ -75,7 +75,7 @@ class RecordingPlan:
     duration: float  # s
     interval: float  # s
     health: str
-    fault: tuple[float, ...]  # N_a, N_b, N_c, xi_x, xi_y, dT; dT is the true soak temperature
+    fault: tuple[float, ...]  # N_a, N_b, N_c, xi_x, xi_y, dT; dT is that of the winding at the start
     theta_0: float  # rad
 
 
@@ -300,7 +300,7 @@ def draw_effect(
 
 
 def draw_bench(strong: bool, rng: np.random.Generator, reach: float = 1.0) -> tuple[RecordingPlan, ...]:
-    """Draw four to eight recordings: commands, lengths, intervals, soak temperatures and states of health.
+    """Draw four to eight recordings: commands, lengths, intervals, ambient temperatures and states of health.
 
     ``reach`` multiplies the speeds and lengths of the commands.
     """

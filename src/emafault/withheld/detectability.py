@@ -1,6 +1,6 @@
 """How visible a truth is: squared distances in noise units between what a bench shows and what other causes would show.
 
-Distances are marginal over the nuisances: unit tolerances, soak temperatures and faults.
+Distances are marginal over the nuisances: unit tolerances, initial winding temperatures and faults.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ SCATTER = 2.0  # half would be one run's variance; derivatives carry the scatter
 LINEAR = 2.0  # prior standard deviations that no nuisance leaves where the first order is believed
 STRIDE = 1.5  # largest step of a nuisance
 FAR = 5.0  # no nuisance further than this, in prior standard deviations
-SOAK = 0.5  # K, prior of the soak temperature
+AMBIENT = 0.5  # K, prior of the ambient temperature
 FAULT_PRIOR = np.array([0.05, 0.05, 0.05, 0.1, 0.1])
 FAULT_SCALE = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 120.0])  # ranges, to add unlike components up
 
@@ -65,18 +65,18 @@ class Detector:
         ]
         first = len(self.tolerances)
         owner: dict[str, int] = {}
-        self.fault_columns: list[list[int]] = []  # per recording: N, xi (none in a healthy one), soak temperature
+        self.fault_columns: list[list[int]] = []  # per recording: N, xi (none in a healthy one), temperature
         for m, plan in enumerate(case.recordings):
             at: list[int] = []
             if plan.health != "healthy":
                 start = owner.setdefault(plan.health if plan.health == "unknown" else f"{m}", first + 5 * len(owner))
                 at = list(range(start, start + 5))
             self.fault_columns.append(at)
-        soak = first + 5 * len(owner)
+        warmth = first + 5 * len(owner)
         for m, at in enumerate(self.fault_columns):
-            at.append(soak + m)
+            at.append(warmth + m)
         self.prior = np.array(
-            [sd for _, _, sd in self.tolerances] + [*FAULT_PRIOR] * len(owner) + [SOAK] * len(case.recordings)
+            [sd for _, _, sd in self.tolerances] + [*FAULT_PRIOR] * len(owner) + [AMBIENT] * len(case.recordings)
         )
         self.views: list[View] = []
         self.base: list[dict[str, np.ndarray]] = []
@@ -88,7 +88,7 @@ class Detector:
             columns = [*range(first), *self.fault_columns[m]]
             for column in columns:
                 moved.append(np.zeros(len(self.prior)))
-                moved[-1][column] = self._step(column, soak)
+                moved[-1][column] = self._step(column, warmth)
             states = [self._state(m, x, {}) for x in moved]
             band = np.ones(len(states))
             band[1] += 1e-4  # the same physics, another switching pattern
@@ -99,7 +99,7 @@ class Detector:
             shifts = view.whiten({n: s[1:] - base[n] for n, s in statistics.items()})
             block = np.zeros((shifts.shape[1], len(self.prior)))
             for column, row in zip(columns, shifts[1:]):
-                block[:, column] = row / self._step(column, soak)
+                block[:, column] = row / self._step(column, warmth)
             self._cancel(m, block)
             self.views.append(view)
             self.base.append(base)
@@ -137,11 +137,11 @@ class Detector:
             total -= (1.0 - N) / self.prior[column] * block[:, column]
         block[:, k] = total / of_k
 
-    def _step(self, column: int, soak: int) -> float:
+    def _step(self, column: int, warmth: int) -> float:
         """Finite-difference step of a nuisance, in prior standard deviations."""
         if column < len(self.tolerances):
             return 1.5
-        return 6.0 if column >= soak else 0.4
+        return 6.0 if column >= warmth else 0.4
 
     def _state(self, m: int, x: np.ndarray, effects: Unit) -> tuple[dict[str, dict[str, float]], np.ndarray]:
         """Unit and fault vector of a recording at nuisances x with effects added."""

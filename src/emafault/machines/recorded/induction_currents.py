@@ -124,7 +124,7 @@ def recordings(arrays: Arrays) -> Found:
         # of a healthy machine with two leads exchanged the size of the unbalance is known, not where it points
         spread, unbalance, zero = float(np.hypot(abs(unbalance), spread)), 0j, 0j
         observed["phases_exchanged"] = {}
-        notes.append("two phases are exchanged against the healthy recording: which, these currents do not tell")
+        notes.append("two phases are exchanged against the healthy recording: which ones, these currents do not show")
     rows = [r for name, part in zip(names, i, strict=True) for r in _rows(name, part, order, unbalance, spread)]
     return Found(rows, tuple(names[:cut]), tuple(names[cut:]), unbalance, zero, spread, tuple(notes), observed)
 
