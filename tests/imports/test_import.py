@@ -59,7 +59,11 @@ def test_any_format_through_the_command(file, tmp_path, fine, truth, capsys):
     assert "one.nc: exists already, --force replaces it" in capsys.readouterr().err
     assert recording.attributes["source"] == file and recording.known["phase_voltage"] == {"reference": "modelled_star"}
     page = (tmp_path / "bench" / "import.html").read_text()
-    assert "pole pairs" in page and "What these recordings do not determine" in page
+    assert (
+        "at an interval of 200 us." in page
+        and "pole pairs" in page
+        and "What these recordings do not determine" in page
+    )
     (said,) = re.findall(r'<img alt="(.*?)"', page)
     assert f"speed up to {np.abs(recording.rotor_speed).max():.3g} rad/s" in said and "mrad from its command" in said
 

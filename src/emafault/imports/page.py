@@ -19,7 +19,8 @@ def draw(result: "Imported", given: Mapping[str, Any]) -> Page:
     """Page of an import."""
     page = Page("Imported recordings")
     count = len(result.recordings)
-    page.paragraph(f"{count} recording{'s' if count > 1 else ''} at an interval of {given['interval']}.", "lead")
+    interval = 1e6 * next(iter(result.recordings.values())).interval
+    page.paragraph(f"{count} recording{'s' if count > 1 else ''} at an interval of {interval:.6g} us.", "lead")
     page.heading("Found from the data")
     page.paragraph(
         "The margin is the misfit (mean square) of the next best interpretation over that of the one taken; what "
