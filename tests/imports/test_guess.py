@@ -43,6 +43,7 @@ def test_channels_are_told_by_names_and_units(names, writer, fine, tmp_path):
     [
         ("Motor Efficiency", "%"), ("Motor Efficiency", ""), ("Frequency", ""), ("Rectangle", ""), ("Mode offset", ""),
         ("Route", ""), ("Output power", "W"), ("Set temperature", "degC"), ("Shaft torque", "N*m"),
+        ("PWM rate", "Hz"), ("Speed loop", "kHz"),
     ],
 )  # fmt: skip
 def test_a_word_that_only_holds_a_stem_or_has_another_unit_leaves_the_blank(name, unit, tmp_path):

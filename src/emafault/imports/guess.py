@@ -84,6 +84,8 @@ def _kind(unit: str) -> str:
     if found.check("1"):
         angles = ("rad", "deg", "degree", "degrees", "turn", "mrad", "rev")
         return "angle" if spelt(unit) in angles else "other" if unit.strip() == "%" else ""
+    if "hertz" in str(found.units):  # which pint takes for rad/s
+        return "other"
     for kind, wanted in (("V", "volt"), ("A", "ampere"), ("speed", "rad/s"), ("length", "m")):
         if found.dimensionality == registry().Quantity(1.0, wanted).dimensionality:
             return kind
