@@ -12,7 +12,7 @@ from .posterior import CHANCE
 #: what a fault vector's components can be of any machine, a unit off nominal allowed for
 POSSIBLE = {"N": (-0.5, 0.95), "xi": (-1.0, 1.0), "dT": (-150.0, 400.0)}
 TOUCHING = 1.0  # eccentricity at which the rotor touches the stator
-WARMTH, LARGEST_WARMTH = 30.0, 150.0  # K from the soak temperature, that are told, and that nothing explains
+WARMTH, LARGEST_WARMTH = 30.0, 150.0  # K from the ambient temperature, that are told, and that nothing explains
 #: of the back-EMF, which tells the turns: how far a unit is off within its tolerance (1 sigma), and far outside it
 BACK_EMF = EFFECTS["unit_calibration"].parameters["k_scale"]
 TOLERANCE, UNIT = BACK_EMF.tolerance, BACK_EMF.high - 1.0
@@ -28,7 +28,7 @@ def doubts(name: str, estimate: Estimate, soaked: float, level: float) -> list[s
     Parameters
     ----------
     name : of the recording
-    soaked : K above the reference temperature
+    soaked : ambient temperature, K above the reference one
     level : of the estimate's intervals
 
     Raises
@@ -60,11 +60,11 @@ def _warmth(name: str, estimate: Estimate, soaked: float) -> list[str]:
     above = estimate["dT"]["value"] - soaked
     if abs(above) > LARGEST_WARMTH:
         raise InputError(
-            f"{name}: dT would be {estimate['dT']['value']:.4g} K where it was soaked at {soaked:.4g} K; its "
+            f"{name}: dT would be {estimate['dT']['value']:.4g} K at an ambient dT of {soaked:.4g} K; its "
             "sensors or ambient_temperature are mistaken, or it is of another actuator"
         )
     if abs(above) > WARMTH:
-        return [f"dT lies {above:.0f} K from the soak temperature: the unit is off nominal, --reference calibrates it"]
+        return [f"dT lies {above:.0f} K from ambient: the unit is off nominal, --reference calibrates it"]
     return []
 
 
