@@ -19,8 +19,8 @@ PLACEBOS = 20
 class Ladder:
     """Confirm recordings under frozen models; what belongs to each recording alone is refitted.
 
-    That is its soak temperature and seeded fault and what else of its nuisances is its own, but for its controller's
-    timing; of a form of the measuring chain only if the model has it.
+    That is its initial winding temperature, its seeded fault and what else of its nuisances is its own, but for its
+    controller's timing; of a form of the measuring chain only if the model has it.
     """
 
     def __init__(self, bench: Bench, recordings: Sequence[str]):

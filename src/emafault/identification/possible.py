@@ -22,13 +22,13 @@ REMEDY = "the unit is off nominal or a channel's scale is mistaken, --reference 
 Estimate = Mapping[str, Mapping[str, float]]
 
 
-def doubts(name: str, estimate: Estimate, soaked: float, level: float) -> list[str]:
+def doubts(name: str, estimate: Estimate, ambient: float, level: float) -> list[str]:
     """What in an estimate lies further out than a nominal unit explains, in words.
 
     Parameters
     ----------
     name : of the recording
-    soaked : ambient temperature, K above the reference one
+    ambient : ambient temperature, K above the reference one
     level : of the estimate's intervals
 
     Raises
@@ -49,18 +49,18 @@ def doubts(name: str, estimate: Estimate, soaked: float, level: float) -> list[s
             f"{name}: xi_x and xi_y would be {eccentricity:.3g} together, at {TOUCHING:g} the rotor touches the "
             "stator; the recording's units, signs or phases are mistaken, or it is of another actuator"
         )
-    return _warmth(name, estimate, soaked) + _negative(name, estimate, level)
+    return _warmth(name, estimate, ambient) + _negative(name, estimate, level)
 
 
 def _kind(component: str) -> str:
     return component if component == "dT" else "N" if component.startswith("N") else "xi"
 
 
-def _warmth(name: str, estimate: Estimate, soaked: float) -> list[str]:
-    above = estimate["dT"]["value"] - soaked
+def _warmth(name: str, estimate: Estimate, ambient: float) -> list[str]:
+    above = estimate["dT"]["value"] - ambient
     if abs(above) > LARGEST_WARMTH:
         raise InputError(
-            f"{name}: dT would be {estimate['dT']['value']:.4g} K at an ambient dT of {soaked:.4g} K; its "
+            f"{name}: dT would be {estimate['dT']['value']:.4g} K at an ambient dT of {ambient:.4g} K; its "
             "sensors or ambient_temperature are mistaken, or it is of another actuator"
         )
     if abs(above) > WARMTH:
