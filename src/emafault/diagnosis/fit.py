@@ -22,7 +22,6 @@ FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
 SINGLES = 3  # listed effects that a search may begin at in the place of what leads
-SHAPED = (*LISTED, "form")  # kinds of units that may have another form than stated
 CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
@@ -285,11 +284,11 @@ class Bench(NormalEquations):
         return search
 
     def _carry_own_forms(self, search: Search) -> bool:
-        """Units of the leading set, then the listed ones that explain most alone, may take another form than theirs, in
+        """Units of the leading set, then those that explain most alone, may take another form than the library's, in
         proportion to their size; whether any of the leading set does that did not before."""
         before = self.sizes
         leading = search.ranked()[0]
-        if before and {c.unit for c in leading.choices if self._kind(c.unit) in SHAPED} <= set(before):
+        if before and {c.unit for c in leading.choices if self._kind(c.unit) in LISTED} <= set(before):
             return False
         nothing = search.fit(())
         alone = [search.fit((m,)) for m in search.candidates if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM]
@@ -297,7 +296,7 @@ class Bench(NormalEquations):
         self.sizes = {}
         for model in [leading, *sorted(good, key=lambda m: -m.log_posterior)]:
             for choice in model.choices:
-                if len(self.sizes) < CARRYING and self._kind(choice.unit) in SHAPED and choice.unit not in self.sizes:
+                if len(self.sizes) < CARRYING and self._kind(choice.unit) in LISTED and choice.unit not in self.sizes:
                     names = self.names_of(choice)
                     self.sizes[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
         return bool(self.sizes)
