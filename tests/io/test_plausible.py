@@ -60,7 +60,7 @@ MISTAKES = {
     "bus in mV": (lambda r: replace(r, bus_voltage=1e3 * r.bus_voltage), ("bus_voltage is", "factor of 1000")),
     "another actuator": (
         lambda r: replace(r, attributes={**r.attributes, "actuator": '{"pole_pairs": 7}'}),
-        ("another actuator", "pole_pairs 7 where 4 is told"),
+        ("another actuator", "pole_pairs 7 where 4 is given"),
     ),
 }
 
