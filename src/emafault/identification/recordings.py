@@ -115,8 +115,8 @@ def identify_recordings(
     if as_one:
         estimates = _as_one(model, recordings, features, told, unit, covariance, level)
     for recording, estimate, said in zip(recordings, estimates, notes, strict=True):
-        ambient = recording.ambient_temperature - identifier.actuator.reference_temperature
-        said[:0] = doubts(recording.name, estimate, ambient, level)
+        warm = recording.ambient_temperature - identifier.actuator.reference_temperature
+        said[:0] = doubts(recording.name, estimate, warm, level)
     return Identified(estimates, ["; ".join(said) for said in notes])
 
 
