@@ -66,15 +66,15 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
 
 
 def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
-    """Log posterior odds that a unit of a set differs from the library's along what its rows lie along by as much as it
-    is large, or more, against its own form or one near it: what is left over of another cause does.
+    """Log posterior odds of a discrepancy as large as a unit of a set itself, or larger, against the unit in the
+    library's form or one near it: what a unit takes up of another cause has such a discrepancy.
 
-    The unit itself, and how much of it each equation has, are of the same prior in both.
+    It is a combination of functions of speed, current, time and angle, which the unit's columns are multiplied by. The
+    unit's own prior, and that of how much of it each equation has, are the same on both sides.
 
     Minus infinity for a unit that carries no form of its own, or none along anything.
     """
     choice = next(c for c in model.choices if c.unit == unit)
-    plain = fit.search.candidates[unit, choice.variant % OTHER_FORM]
     forms = [
         fit.search.candidates[unit, v] for u, v in fit.search.candidates
         if u == unit and v >= OTHER_FORM and v % OTHER_FORM == choice.variant % OTHER_FORM
@@ -82,7 +82,7 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     prior = prior_of(fit, model)
     names: Sequence[str] = fit.search.reduced.names
     evidence = partial(_evidence, fit.search.reduced)
-    itself = {n: q for n, q in prior.items() if not n.startswith(f"own.{unit}.")} | {n: prior[n] for n in plain.names}
+    itself = {n: q for n, q in prior.items() if not n.startswith(f"own.{unit}.")}
     own = [{names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)} for f in forms]
     near = [evidence(itself | form) for form in own]
     widest = {tuple(form): form for form in sorted(own, key=lambda form: max(form.values()))}

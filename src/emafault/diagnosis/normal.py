@@ -19,8 +19,8 @@ class NormalEquations(Point):
 
     Parameters
     ----------
-    machine : gives ``parameters``, ``units``, ``blocks(values, recordings)`` and ``families(equation)``: sets of
-        functions of its remainder that go along one coordinate
+    machine : gives ``parameters``, ``units``, ``blocks(values, recordings)``, and ``families(equation)`` and
+        ``own_families(equation)``: sets of functions of its remainder and of an own form that go along one coordinate
     recordings : names of those that are fitted
     processes : in which recordings are linearised side by side
     """

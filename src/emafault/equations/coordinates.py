@@ -18,7 +18,7 @@ ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 1
 SMOOTH = 3  # functions of the speed that an own form has
 #: functions of an own form along one coordinate: speed, current, time, angle
 OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6), (0, 7, 8, 9, 10, 11, 12, 13, 14))
-SLOW = 8.0  # rad/s, below which friction is another
+SLOW = 8.0  # rad/s, scale of the range of low speeds, where friction changes most
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
 SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
@@ -48,11 +48,12 @@ def functions_of(rec: Signals) -> dict[str, Any]:
     top = rec.actuator.bus_voltage / (2.0 * rec.actuator.back_emf)
     far = np.log1p(np.abs(rec.speed) / SLOW) / np.log1p(top / SLOW)
     smooth = [np.sqrt(2.0) / k * np.cos(np.pi * k * far) for k in range(1, SMOOTH + 1)]
-    return {**base, "phi": np.array(phi), "own": _own(phi, smooth)}
+    stacked = np.array(phi)
+    return {**base, "phi": stacked, "own": _own(stacked, smooth)}
 
 
-def _own(phi: Sequence[np.ndarray], smooth: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Functions of an own form, (row,) each, from those of a remainder and smooth ones of the speed."""
+def _own(phi: np.ndarray, smooth: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Functions of an own form, (row,) each: views of those of a remainder, and smooth ones of the speed."""
     return [*phi[:2], *smooth, *phi[LEVEL:14]]
 
 
@@ -79,10 +80,10 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     if of is None:
         return kinds
     along = {k: of(v) for k, v in base.items()}
-    phi = [of(f) for f in phi]
+    stacked = np.array([of(f) for f in phi])
     return {
-        **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": np.array(phi),
-        "own": _own(phi, [of(f) for f in own[2 : 2 + SMOOTH]]), **kinds,
+        **along, "rotor_angle": np.mod(along["angle"], 2.0 * np.pi), "phi": stacked,
+        "own": _own(stacked, [of(f) for f in own[2 : 2 + SMOOTH]]), **kinds,
     }  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .recording import PHASES, Recording
-from .scales import current_scales, largest
+from .scales import CERTAIN, current_scales, largest
 
 FUNDAMENTAL = 24.0 / np.pi**2 * np.sin(np.pi / 6.0)  # of the trapezoid with slopes of 60 degrees
 KNOWN = 0.05  # relative standard error below which a coefficient can refuse a recording
@@ -30,7 +30,6 @@ LARGEST_ANGLE = np.deg2rad(12.0)  # electrical, of the angle's zero; the catalog
 LINE_TO_LINE = (np.deg2rad(20.0), 1.4)  # angle and size of K from which voltages look measured from line to line
 UNBALANCED = 0.35  # of the currents' size, that their sum may be
 OFFSET = 0.05  # of the supply, that a voltage may be off by at rest
-CERTAIN = 6.0  # standard errors
 FROZEN_TURNS, FROZEN = 4.0 * np.pi, 0.05  # electrical rad and s, through which a channel of a phase must change
 FINE = 3.0  # steps of its resolution, by which samples of a channel differ that cannot stay the same by chance
 LATE = 4  # column of the voltage equation
