@@ -110,6 +110,18 @@ def test_a_size_that_is_known_roughly_is_looked_for_above_zero(word, shape, size
     assert found.values[size] > 0.0
 
 
+def test_a_shape_ends_at_its_optimum_however_far_it_begins():
+    machine = Machine("power", {"exponent": 2.0}, (4.0,), 1)
+    scale = machine.proposed()[0].scale
+    ends = []
+    for begun in (1.6, 2.0, 2.9):
+        rough = Described("~p", "power", "torque", 1, (("exponent", begun, 0.03, "1"),), scale, 1.0)
+        found = refined(WithForms(machine, [rough]), rough, machine.found, machine.carried, {}, {})
+        ends.append(found.values["exponent"])
+    assert np.ptp(ends) < 0.1 * 0.03
+    assert np.mean(ends) == pytest.approx(2.0, abs=0.01)
+
+
 @pytest.mark.parametrize("parts", [2, 3])
 def test_a_scan_in_parts_finds_what_one_does(parts):
     machine = Machine("order", {"order": 3.27}, (0.15, 0.1))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .evidence import Definite, Reduced
+from .evidence import SETTLED, Definite, Reduced
 from .forms import FORMS
 from .left import Left, beside_first, gain
 from .linear import FEW
@@ -16,8 +16,7 @@ PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
 BINS = (30, 15, 8)  # of a picture: the most that show more than their errors
 FINER = 2.0  # times what a coarse look finds, that a fine one may
-REFINED = 3  # rounds over the parameters of a shape
-STEPS = (-3.0, -1.0, -0.3, 0.3, 1.0, 3.0)  # standard deviations of its scan
+STEPS = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # standard deviations of a scan, about the shape that it has found
 PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
 ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
@@ -266,17 +265,37 @@ def refined(
         g, G = zip(*(left.products(beside_constant, 0) for left in lefts), strict=True)
         return gain(*beside_first(np.sum(g, axis=0), np.sum(G, axis=0)))
 
-    best = value(form)
-    for _ in range(REFINED):
-        for k, (name, at, width, unit) in enumerate(form.shape):
-            for step in STEPS if width > 0.0 else ():
-                if name in module.POSITIVE and at + step * width <= 0.0:
-                    continue
-                shape = (*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
-                found = value(replace(form, shape=shape))
-                if found > best:
-                    best, form = found, replace(form, shape=shape)
+    best, before = value(form), -np.inf
+    while best - before >= SETTLED:
+        before = best
+        for k, (name, _, width, _) in enumerate(form.shape):
+            if width > 0.0:
+                form, best = _along(value, form, best, k, name in module.POSITIVE)
     return form
+
+
+def _along(
+    value: Callable[[Described], float], form: Described, best: float, k: int, positive: bool
+) -> tuple[Described, float]:
+    """A form, and its value, at the best of several steps of one parameter of its shape, or at the vertex of the
+    parabola through that and its neighbours."""
+    name, at, width, unit = form.shape[k]
+
+    def stepped(step: float) -> tuple[float, Described]:
+        shape = (*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
+        moved = replace(form, shape=shape)
+        return (best if step == 0.0 else value(moved)), moved
+
+    steps = [s for s in STEPS if not positive or at + s * width > 0.0]
+    found = [stepped(s) for s in steps]
+    top = max(range(len(steps)), key=lambda i: found[i][0])
+    if 0 < top < len(steps) - 1:
+        around = slice(top - 1, top + 2)
+        square, slope, _ = np.polyfit(steps[around], [v for v, _ in found[around]], 2)
+        if square < 0.0:
+            found.append(stepped(float(-0.5 * slope / square)))
+    value_there, there = max(found, key=lambda x: x[0])
+    return there, value_there
 
 
 def without(machine: WithForms, form: Described, blocks: Sequence[Block], values: Mapping[str, float]) -> list[Block]:

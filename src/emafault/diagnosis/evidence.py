@@ -9,6 +9,7 @@ from scipy.special import log_ndtr
 from ..compiled import compiled
 
 CLEAR = 3.0  # nats of predictive density that clearly speak for or against (Kass and Raftery 1995, JASA 90, 773)
+SETTLED = 0.5  # nats that one more step to an optimum may still promise
 MANY = 32  # rows from which on a matrix is factored along its rows
 RIDGES = (0.0, 1e-12, 1e-10, 1e-8)  # of a unit diagonal, the first that makes a matrix definite
 

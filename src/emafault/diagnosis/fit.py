@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import expit
 
 from .described import Described, proposed, refined, with_forms
-from .evidence import Normal
+from .evidence import SETTLED, Normal
 from .linear import White
 from .linearisation import Carried, Task
 from .model import LISTED
@@ -26,7 +26,6 @@ CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
 FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
-SETTLED = 0.5  # log evidence that one more step of a set may still promise
 
 
 NOTHING = Model((), 0.0, 0.0, {}, {})  # the unit alone
