@@ -60,17 +60,17 @@ def test_an_entry_has_the_values_of_the_form(word):
         np.testing.assert_allclose(got, wanted, atol=2e-3 * np.abs(wanted).max())
 
 
-def recorded(unlisted, voltage=0.1):
+def recorded(unlisted, voltage=0.1, interval=2e-4):
     """A recording of the nominal unit with these entries, its noise a tenth of the usual, that of voltages ``voltage``
     times the usual."""
     runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
     position = command_positions("sine", COMMANDS["sine"], 0.8, ACTUATOR.control_period)
     sensors = {name: (voltage if name == "voltage" else 0.1) * value for name, value in SPEC["sensors"].items()}
     spec = {"sensors": sensors, "seed": 1, "unlisted": unlisted}
-    out = simulate_and_measure(spec, runs, position, 0.8, 2e-4, recording="a.nc")
+    out = simulate_and_measure(spec, runs, position, 0.8, interval, recording="a.nc")
     ambient = float(out.pop("ambient_temperature")[0])
     return Recording(
-        time=time_axis(0.8, 2e-4), ambient_temperature=ambient, attributes={"health": "healthy"},
+        time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": "healthy"},
         **{k: v[0] for k, v in out.items()},
     )  # fmt: skip
 
@@ -180,6 +180,29 @@ def test_a_wave_lies_alike_in_both_directions():
             assert np.hypot(cosine, sine) == pytest.approx(size, rel=0.1)
             phases.append(np.arctan2(sine, cosine))
         assert np.abs(phases).max() < 0.02
+
+
+COARSE = [
+    ({"form": "order", "amplitude": 0.02, "phase": 0.0}, {"order": 9.0}, 0.02),
+    ({"form": "bump", "depth": 0.05}, {"centre": 2.0, "width": 0.12}, 0.05),
+]
+
+
+@pytest.mark.parametrize(("sized", "shape", "size"), COARSE, ids=["order", "bump"])
+def test_a_form_is_as_large_where_an_interval_sweeps_much_of_it(sized, shape, size):
+    entry = {"place": "torque", **sized, **shape}
+    form = described(entry["form"], shape=shape)
+    rows = []
+    for unlisted in ([entry], []):
+        machine = WithForms(machine_of({"a.nc": recorded(unlisted, interval=1e-3)}), [form])
+        off = {n: p.off for n, p in machine.parameters.items()}
+        block = next(b for b in machine.blocks(off, "a.nc") if b.equation == "torque")
+        rows.append((block, np.column_stack([*(block.columns[n] for n in form.names("a.nc")), block.residual])))
+    speed = np.abs(block.coordinates["rotor_speed"])
+    fast = block.usable & rows[0][0].usable & (speed > 0.7 * speed.max())
+    left = (rows[0][1] - rows[1][1])[fast, -1]
+    found = np.linalg.lstsq(rows[0][1][fast, :-1], -left, rcond=None)[0]
+    assert np.hypot(*found, *[0.0] * (2 - len(found))) == pytest.approx(size, rel=0.05)
 
 
 def test_a_coefficient_of_two_equations_is_looked_at_in_both():

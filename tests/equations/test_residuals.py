@@ -156,6 +156,18 @@ def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     assert rows * (off[equation] - on[equation]) > 10.0
 
 
+def test_cogging_is_as_large_where_an_interval_sweeps_a_period_of_it():
+    given = {"cogging": {"a": 0.01}}
+    recording = recorded("reversal", interval=8e-4, effects=given)
+    machine = machine_of({"a.nc": recording})
+    at = truth(machine, recording, given)
+    block = next(b for b in machine.blocks(at, "a.nc") if b.equation == "torque")
+    assert 72 * np.abs(block.coordinates["half_sweep"]).max() > 2.5
+    x, left = whiten(block.bands, block.usable, np.array([block.columns["cogging.a"], block.residual]).T).T
+    assert abs(x @ left) / np.sqrt(x @ x) < 3.0
+    assert mean_squares(machine, at)["torque"] < 1.2
+
+
 def test_every_effect_has_a_size_here():
     assert set(SIZES) == set(EFFECTS) - {"speed_quantisation"}
 

@@ -18,6 +18,8 @@ ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 1
 SMOOTH = 3  # functions of the speed that an own form has
 #: functions of an own form along one coordinate: speed, current, time, angle
 OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6), (0, 7, 8, 9, 10, 11, 12, 13, 14))
+#: times that rows are averaged over an interval, where not once: a second difference is a mean of means
+AVERAGED = {"torque": 2, "position": 0}
 SLOW = 8.0  # rad/s, scale of the range of low speeds, where friction changes most
 BEATS = 0.1  # of the rate of runs, below which a wave in their means is not one of their own
 SHARE = 0.02  # relative change of the torque constant, for a remainder of the size of the noise
@@ -34,7 +36,7 @@ def functions_of(rec: Signals) -> dict[str, Any]:
     base = {
         "direction": direction, "rotor_speed": rec.speed, "current": 2.0 * level, "time": rec.time,
         "rotor_angle": np.mod(rec.middle, 2 * np.pi), "angle": rec.middle, "output_angle": rec.shaft,
-        "temperature": np.full(rec.size, rec.ambient),
+        "temperature": np.full(rec.size, rec.ambient), "half_sweep": rec.half_sweep,
     }  # fmt: skip
     phi = [
         np.ones(rec.size), direction, np.abs(w), w * w, level - 0.3, t,
@@ -69,6 +71,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
         "drivers": np.array(drivers_of(state, equation, functions)),
     }
     of = rows_of(state, equation)
+    kinds["averaged"] = AVERAGED.get(equation, 1)
     if equation == "torque":
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
         kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}

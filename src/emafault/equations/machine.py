@@ -191,8 +191,8 @@ class ReferenceActuator:
         rec = self.recordings[name]
         found = self._functions_of(rec)
         if place not in ("angle", "output"):
-            return found
-        return {**found, "angle": rec.angle, "rotor_angle": np.mod(rec.angle, 2.0 * np.pi)}
+            return {**found, "averaged": 1}
+        return {**found, "angle": rec.angle, "rotor_angle": np.mod(rec.angle, 2.0 * np.pi), "averaged": 0}
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
         state = State(rec, Point(values, rec.name, wanted))

@@ -1,6 +1,7 @@
 """J dw/dt = T_e - B w - T_load - T_F, in the second difference of the recorded angle.
 
-Both sides are averaged over the triangle of two intervals that the second difference weighs an acceleration with.
+Both sides are averaged over the triangle of two intervals that the second difference weighs an acceleration with: what
+goes along the angle exactly (hook ``between``), means over intervals as those of something that bends but little.
 Samples around rest are left out: dry friction has no known sign there.
 """
 
@@ -32,6 +33,15 @@ def net_torque(state: State) -> Dual:
     return net
 
 
+def _beyond_means(state: State) -> Dual | float:
+    """(sample,) what terms that go along the angle have, over two intervals, beyond what their means have (N m)."""
+    out: Dual | float = 0.0
+    for m in with_hook("between"):
+        p = state.p.of(effect_name(m))
+        out = out + m.between(p, state.rec) - m.torque(p, state.rec).linear(two_intervals, state.rec.size)
+    return out
+
+
 def residual(state: State) -> Dual:
     """J0 times the measured acceleration less that of the model (N m)."""
     rec, a = state.rec, state.rec.actuator
@@ -44,11 +54,11 @@ def residual(state: State) -> Dual:
     inertia = inertia * state.rotor_share
     net = net_torque(state)
     state.net = np.asarray(net.value)
-    balance = net / inertia
+    balance = (net.linear(two_intervals, rec.size) - _beyond_means(state)) / inertia
     theta = rec.angle
     second = np.zeros(rec.size)
     second[1:-1] = (theta[2:] - 2.0 * theta[1:-1] + theta[:-2]) / rec.interval**2
-    return a.inertia * second - balance.linear(two_intervals, rec.size)
+    return a.inertia * second - balance
 
 
 def two_intervals(x: np.ndarray) -> np.ndarray:

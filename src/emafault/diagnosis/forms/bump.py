@@ -19,11 +19,18 @@ WIDEST = 1.0  # rad, standard deviation: what is wider is about no one angle, an
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(1, row) one at the centre."""
-    return _about(coordinates["rotor_angle"], shape["centre"], shape["width"])[None]
+    """(1, row) one at the centre, or its mean where rows are ``averaged`` over what an interval sweeps."""
+    return _seen(coordinates, shape["centre"], shape["width"])[None]
 
 
-def _about(angle, centre: float, width: float) -> np.ndarray:
+def _seen(coordinates: Mapping, centre: float, width: float) -> np.ndarray:
+    """A Gaussian averaged: another one, wider by the variance of what it is averaged over."""
+    half = np.asarray(coordinates.get("half_sweep", 0.0))
+    wide = np.sqrt(width**2 + coordinates.get("averaged", 0) * half**2 / 3.0)
+    return width / wide * _about(coordinates["rotor_angle"], centre, wide)
+
+
+def _about(angle, centre: float, width) -> np.ndarray:
     distance = np.mod(np.asarray(angle) - centre + np.pi, 2.0 * np.pi) - np.pi
     return np.exp(-0.5 * (distance / width) ** 2)
 
@@ -48,8 +55,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
         tried = [(centre + reach * x, w) for x in np.linspace(-1, 1, 5) for w in widths]
 
         def of(b, tried=tried):
-            angle = b.coordinates["rotor_angle"]
-            return np.array([np.ones(len(angle)), *(_about(angle, *s) for s in tried)])
+            return np.array([np.ones(len(b.residual)), *(_seen(b.coordinates, *s) for s in tried)])
 
         values = singly(*beside_first(*left.products(of, driver)))
         (centre, width), reach, ratio = tried[int(np.argmax(values))], reach / 2.5, ratio**0.5

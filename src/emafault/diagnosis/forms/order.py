@@ -20,9 +20,10 @@ AROUND = 30.0  # lines whose level a line stands out of
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(2, row) cosine and sine."""
+    """(2, row) cosine and sine, their means where rows are ``averaged`` over what an interval sweeps."""
     x = shape["order"] * np.asarray(coordinates["angle"])
-    return np.array([np.cos(x), np.sin(x)])
+    half = shape["order"] * np.asarray(coordinates.get("half_sweep", 0.0))
+    return np.sinc(half / np.pi) ** coordinates.get("averaged", 0) * np.array([np.cos(x), np.sin(x)])
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:

@@ -7,8 +7,31 @@ ORDER = 72
 
 
 def torque(p, rec):
-    """Resisting torque (N m), its mean over the angle swept."""
+    """Resisting torque (N m), its mean over the angle swept in each interval."""
     a = p("a")
     if not (a.value or a.slopes):
         return a
     return a * (np.sin(ORDER * rec.middle) * np.sinc(ORDER * rec.half_sweep / np.pi))
+
+
+def between(p, rec):
+    """Resisting torque (N m), its mean over the triangle of two intervals about each sample of the angle.
+
+    With the wave's phase x at the sample, and d further at an interval's end, the mean of sin under a weight that falls
+    from one at the sample to zero is sin(x) (1 - cos(d)) / d^2 + cos(x) (d - sin(d)) / d^2.
+    """
+    a = p("a")
+    if not (a.value or a.slopes):
+        return a
+    before = 2.0 * ORDER * rec.half_sweep
+    after = np.append(before[1:], before[-1])
+    x = ORDER * rec.angle
+    even = 0.5 * (np.sinc(before / (2.0 * np.pi)) ** 2 + np.sinc(after / (2.0 * np.pi)) ** 2)
+    return a * (even * np.sin(x) + (_odd(after) - _odd(before)) * np.cos(x))
+
+
+def _odd(d):
+    """(d - sin(d)) / d^2."""
+    small = np.abs(d) < 1e-2
+    far = np.where(small, 1.0, d)
+    return np.where(small, d / 6.0, (far - np.sin(far)) / far**2)
