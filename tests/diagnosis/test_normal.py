@@ -1,6 +1,7 @@
 """Steps of the point within the reach of the priors."""
 
 import numpy as np
+import pytest
 
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Block, Parameter
@@ -30,3 +31,14 @@ def test_what_is_held_at_the_end_of_its_prior_is_held_while_the_others_are_fitte
     assert bench.point["a"] == bench.reach
     b = normal.index["b"]
     assert abs(bench.point["b"] + normal.g[b]) < 1e-6 * normal.H[b, b]
+
+
+def test_a_unit_at_the_end_of_its_tolerance_is_within_reach():
+    """0.61 is within four tolerances of 10 %, though its logarithm is 4.9 of them from that of 1."""
+
+    class Scaled(Machine):
+        parameters = {"k": Parameter("k", 1.0, 1.0, 0.1, vanishes=0.0)}  # noqa: RUF012
+
+    bench = Bench(Scaled(), ["r"])
+    for wanted, held in ((0.61, 0.61), (0.5, 0.6), (1.45, 1.45), (2.0, np.exp(0.4))):
+        assert np.exp(bench._within_reach("k", np.log(wanted))) == pytest.approx(held)

@@ -10,6 +10,7 @@ from .whitening import factored
 
 LISTED = ("structural", "calibration")  # kinds of units that the catalogue lists
 SETTINGS = ("control", "commutation")  # equations of the controller, whose form is its own business
+TOLERANCES = 4.0  # within which a unit's own values lie: its parameters' prior standard deviations
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
     "lag", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "function", "power",

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .linear import OWN_FORM
-from .model import Parameter, Unit, Variant
+from .model import TOLERANCES, Parameter, Unit, Variant
 from .search import OTHER_FORM, Choice
 
-REACH = (1.0, 3.0)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
+REACH = (1.0, TOLERANCES)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
 
 
 def is_parameter(column: str) -> bool:
@@ -124,7 +124,14 @@ class Point:
     def _within_reach(self, name: str, deviation: float) -> float:
         """A deviation no further than the prior has any mass: a model that lacks the cause asks for more."""
         mean, sd, _ = self.prior(name)
-        return float(min(max(deviation, mean - self.reach * sd), mean + self.reach * sd))
+        low, high = mean - self.reach * sd, mean + self.reach * sd
+        p = self.parameters[name]
+        if p.vanishes is not None and p.alias is None:  # a tolerance may be one of the value, or of its logarithm
+            u, factor = self._factor(name)
+            least = (p.mean - self.reach * p.sd - p.vanishes) / factor
+            if least > 0.0:
+                low = min(low, u * float(np.log(least)))
+        return float(min(max(deviation, low), high))
 
     def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:
         """An effect found along a secant gets parameters of its own."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..diagnosis.model import Parameter, Unit, Variant
+from ..diagnosis.model import TOLERANCES, Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
 from . import commutation
@@ -25,7 +25,6 @@ BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
-OUTSIDE = 4.0  # tolerances, that one value at least of a unit named for its calibration is off by
 PER_PHASE = ("a", "b", "c")
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
@@ -105,7 +104,7 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
             base = known[full]
             width = _width(p.nominal, p.low, p.high) * (base.off / p.nominal)
             parameters.append(Parameter(full + "+", 0.0, 0.0, width, p.units, alias=full, vanishes=_vanishes(base.off)))
-        hole = [OUTSIDE * known[p.alias or ""].sd / p.sd for p in parameters]
+        hole = [TOLERANCES * known[p.alias or ""].sd / p.sd for p in parameters]
         return Unit(effect.id, "calibration", effect.equations, [Variant(parameters, (), min(hole), hole)])
     own = internal(effect, actuator)
     for name, q in own.items():
