@@ -58,7 +58,7 @@ def log_evidence(tolerances, *hole):
     reduced = Reduced(["scale+"], np.array([[known]]), np.array([known * tolerances * within]), 0.0, np.zeros(1))
     candidate = Candidate(
         np.zeros(1, int), np.zeros(1), np.ones(1), np.zeros(1, int), (1.0,), ["scale+"],
-        within * np.array(hole), within * np.ones(len(hole)),
+        within * np.outer([-1.0, 1.0], hole), within * np.ones(len(hole)),
     )  # fmt: skip
     search = Search(reduced, [unit("scale", "torque", kind="calibration")], {("scale", 0): candidate})
     return search.fit((("scale", 0),)).log_likelihood - search.fit(()).log_likelihood

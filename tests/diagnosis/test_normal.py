@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from emafault.diagnosis.fit import NOTHING, Bench
-from emafault.diagnosis.model import Block, Parameter
+from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Variant
 
 ROWS = 4000
 
@@ -42,3 +42,17 @@ def test_a_unit_at_the_end_of_its_tolerance_is_within_reach():
     bench = Bench(Scaled(), ["r"])
     for wanted, held in ((0.61, 0.61), (0.5, 0.6), (1.45, 1.45), (2.0, np.exp(0.4))):
         assert np.exp(bench._within_reach("k", np.log(wanted))) == pytest.approx(held)
+
+
+def test_the_hole_of_a_calibration_has_its_edges_at_values_of_the_unit():
+    """Four tolerances of 10 % below one are 0.6, whose logarithm is further from one's than that of 1.4."""
+
+    class Scaled(Machine):
+        parameters = {  # noqa: RUF012
+            "k": Parameter("k", 1.0, 1.0, 0.1, vanishes=0.0),
+            "k+": Parameter("k+", 0.0, 0.0, 0.5, alias="k", vanishes=0.0),
+        }
+
+    variant = Variant([Scaled.parameters["k+"]], hole=[TOLERANCES * 0.1 / 0.5])
+    low, high = Bench(Scaled(), ["r"])._hole(variant)[:, 0] * 0.5
+    assert np.exp([low, high]) == pytest.approx([0.6, 1.4])

@@ -206,7 +206,7 @@ class NormalEquations(Point):
                 plain = Candidate(
                     index, np.array([q[0] for q in prior]), np.array([q[1] for q in prior]), signs,
                     (1.0,) if switch else tuple(w for w in widths if w >= min(variant.least, 1.0)), names,
-                    np.array(variant.hole), np.array([self._tolerance(p) for p in variant.parameters]),
+                    self._hole(variant), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain
                 for k, (share, inside) in enumerate(self._own_kinds(reduced, own), start=1):
@@ -244,6 +244,16 @@ class NormalEquations(Point):
             for n in range(min(map(len, of.values()))):
                 every.append(np.array([k for k, (e, f) in where.items() if int(f) in of[e][n]], int))
         return [(share, inside) for inside in every for share in OWN_SHARES]
+
+    def _hole(self, variant: Variant) -> np.ndarray:
+        """(2, parameter) edges of the hole in its prior, in the deviations' standard deviations."""
+        edges = np.array([-1.0, 1.0])[:, None] * np.array(variant.hole)
+        for k, p in enumerate(variant.parameters if edges.size else ()):
+            if p.vanishes is not None:  # the tolerance is one of the value, the deviation that of its logarithm
+                sd = p.sd / abs(self.parameters[p.alias or p.name].off - p.vanishes)
+                with np.errstate(divide="ignore"):
+                    edges[:, k] = np.log(np.maximum(1.0 + edges[:, k] * sd, 0.0)) / sd
+        return edges
 
     def _tolerance(self, p: Parameter) -> float:
         """Tolerance of the quantity that a parameter is beyond, as a share of the parameter's prior."""

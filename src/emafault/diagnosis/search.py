@@ -62,7 +62,7 @@ class Candidate:
     signs: np.ndarray
     widths: tuple[float, ...]
     names: list[str]
-    hole: np.ndarray = field(default_factory=lambda: np.zeros(0))  # prior standard deviations, see ``Variant``
+    hole: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))  # its edges in standard deviations from off
     within: np.ndarray = field(default_factory=lambda: np.zeros(0))  # tolerance, in the same
     extra: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # own form
     extra_sd: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -117,7 +117,7 @@ class Search:
         value, index, mean, deviation = best
         value += sum(self.corrections.get(m[0], 0.0) for m in members)
         value += sum(
-            self._outside(m, width[m], index, mean, deviation) for m in members if len(self.candidates[m].hole)
+            self._outside(m, width[m], index, mean, deviation) for m in members if self.candidates[m].hole.size
         )
         value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
         value -= sum(np.log(self.variants(m[0])) for m in members)
@@ -180,8 +180,9 @@ class Search:
         more = 1.0 + (c.within / width) ** 2
         x = (mean[k] - self.reduced.fixed[c.index]) / c.sd * more
         s = np.maximum(deviation[k] / c.sd * more, 1e-9)
-        inside = ndtr((c.hole - x) / s) - ndtr((-c.hole - x) / s)
-        before = 1.0 - 2.0 * ndtr(-c.hole / width)
+        low, high = c.hole
+        inside = ndtr((high - x) / s) - ndtr((low - x) / s)
+        before = ndtr(high / width) - ndtr(low / width)
         return float(np.log(np.maximum(1.0 - np.prod(inside), TINY)) - np.log(1.0 - np.prod(before)))
 
     def variants(self, unit: str) -> int:

@@ -179,7 +179,7 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
         c = bench.candidates[m]
         members[m] = float(rng.choice(c.widths))
         k = bench.rest[c.index]
-        held = np.array([bench.tolerance[int(q)] for q in k]) if len(c.hole) else np.zeros(0, int)
+        held = np.array([bench.tolerance[int(q)] for q in k]) if c.hole.size else np.zeros(0, int)
         position = np.searchsorted(bench.n, held, sorter=np.argsort(bench.n))
         position = np.argsort(bench.n)[position] if len(held) else position
         while True:
@@ -206,9 +206,11 @@ def _allowed(bench: LinearBench, c: Candidate, d: np.ndarray) -> np.ndarray:
     k = bench.rest[c.index]
     apart = d[:, k] - bench.fixed[k]
     good = np.all((c.signs == 0) | (apart * c.signs >= 0.0), axis=1)
-    if len(c.hole):
+    if c.hole.size:
         held = [bench.tolerance[int(q)] for q in k]
-        good &= np.any(np.abs(apart + d[:, held]) >= c.hole * c.sd, axis=1)
+        low, high = c.hole * c.sd
+        off = apart + d[:, held]
+        good &= np.any((off <= low) | (off >= high), axis=1)
     return good
 
 
@@ -295,7 +297,7 @@ def _value(search: Search, members: Members, widths: Sequence[float]) -> float:
     """Log evidence of a set under these widths, their own prior left out."""
     width = dict(zip(members, widths, strict=True))
     value, index, mean, deviation = search._evidence(members, width)
-    holes = [m for m in members if len(search.candidates[m].hole)]
+    holes = [m for m in members if search.candidates[m].hole.size]
     return float(value + sum(search._outside(m, width[m], index, mean, deviation) for m in holes))
 
 
