@@ -48,6 +48,27 @@ def test_nothing_is_left_along_any_coordinate(case):
     assert max(abs(left @ f) / np.sqrt(f @ f) for f in along if f @ f > 0.0) < 4.0
 
 
+def test_about_a_constant_speed_rounding_says_nothing_of_its_scale():
+    """There the value next to it comes up on one side alone, as often as noise reaches it."""
+    step = {"speed_quantisation": {"step": 1.3}}
+    recordings = {
+        f"{k}.nc": recorded("reversal", effects=step, interval=1e-4, seed=k, theta_0=float(k)) for k in range(4)
+    }
+    machine = machine_of(recordings)
+    at, name, whites = {n: p.off for n, p in machine.parameters.items()}, "speed_scale.scale", []
+    for recording in recordings:
+        block, other = (
+            next(b for b in machine.blocks(at, recording, drawn, {name}) if b.equation == "sensor_speed")
+            for drawn in (False, True)
+        )
+        white = compressed_columns(block, [name], [block.columns[name], block.residual], None)
+        correct(white, disturbance(block, other, [name], None))
+        whites.append(white)
+    normal = assemble(whites, [name], {})
+    assert normal.H[0, 0] > 1e7
+    assert abs(normal.g[0]) < 3.0 * np.sqrt(normal.H[0, 0])
+
+
 def test_noise_about_a_standstill_does_not_drive_what_is_behind_a_play():
     leap = {"amplitude": 0.046, "time": 0.05}
     noisy, exact = (

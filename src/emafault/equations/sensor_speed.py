@@ -1,12 +1,16 @@
 """The recorded speed against the rate of the recorded angle."""
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from .acquisition import recorded_late
 from .dual import Dual
 from .point import State, effect_name
+from .signals import Signals, odd
 from .terms import with_hook
 
+BESIDE = 1e-2  # s
+REACHES = 3.0  # standard deviations of the noise
 LITTLE = 0.01  # of the variance: covariances below it do not count
 
 
@@ -48,11 +52,20 @@ def noise_bands(state: State) -> list[np.ndarray]:
 
 def usable(state: State) -> np.ndarray:
     """(sample,) all but the first and last, where the speed lies on a lattice those next to a change: in between, what
-    rounding leaves is the same again and again, and on both sides of a change together it is nothing."""
+    rounding leaves is the same again and again, and on both sides of a change together it is nothing, where the speed
+    sweeps over it. Where it rests beside it, what noise rounds across comes from one side alone."""
     rec = state.rec
-    changes = np.diff(rec.speed_recorded) != 0.0
     out = np.ones(rec.size, bool)
     if rec.speed_step > 0.0:
+        changes = np.diff(rec.speed_recorded) != 0.0
         out[1:-1] = changes[1:] | changes[:-1]
+        out &= rec.once(("sensor_speed", "sweeps"), lambda: _sweeps(rec))
     out[0] = out[-1] = False
     return out
+
+
+def _sweeps(rec: Signals) -> np.ndarray:
+    """(sample,) whether the speed sweeps over what its noise reaches from ``BESIDE`` before to as long after."""
+    reach = odd(BESIDE / rec.interval)
+    calm = np.pad(uniform_filter1d(rec.rate, reach, mode="nearest"), reach, mode="edge")
+    return np.abs(calm[2 * reach :] - calm[: -2 * reach]) > 2.0 * REACHES * rec.noise.speed
