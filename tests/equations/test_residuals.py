@@ -131,6 +131,31 @@ def test_a_supply_that_sags_gives_the_same_power_by_more_current():
     assert mean_squares(machine, truth(machine, recording, given))["bus"] < 1.3
 
 
+SUPPLIES = [{"bus_voltage": {"Vdc": 44.0}}, {"bus_voltage": {"Vdc": 49.0}, "bus_resistance": {"R": 0.3}}]
+LEAP = {"amplitude": 0.06, "time": 0.02}
+
+
+@pytest.mark.parametrize("given", SUPPLIES, ids=["voltage", "sag"])
+def test_a_supply_that_is_not_recorded_shows_where_the_regulator_never_switches(given):
+    recording = replace(recorded("step", interval=2e-4, effects=given, settings=LEAP), bus_voltage=None)
+    machine = machine_of({"a.nc": recording})
+    values = truth(machine, recording, given)
+    block = next(b for b in machine.blocks(values, "a.nc") if b.equation == "bus")
+    assert block.usable.sum() > 15
+    assert mean_squares(machine, values)["bus"] < 2.0
+    rows = np.column_stack([block.columns["bus_voltage.Vdc"] * np.ones(len(block.residual)), block.residual])
+    column, left = whiten(block.bands, block.usable, rows).T
+    assert abs(column @ left / (column @ column)) < 0.12  # V
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_where_the_regulator_switches_no_voltage_is_taken_for_the_supply(command):
+    for interval in (1e-4, 1e-3):
+        recording = replace(recorded(command, interval=interval), bus_voltage=None)
+        machine = machine_of({"a.nc": recording})
+        assert all(b.equation != "bus" for b in machine.blocks(truth(machine, recording), "a.nc"))
+
+
 def test_beyond_its_plateau_a_phase_makes_less_torque():
     given = {"hall_displacement": {"d_a": -4.6, "d_b": -4.6, "d_c": -0.3}}
     recording = recorded("reversal", effects=given)

@@ -7,6 +7,7 @@ from ..diagnosis.model import Block
 from ..diagnosis.whitening import whiten
 from ..reporting.panels import Curves, Panel
 from ..reporting.regions import coordinate
+from . import bus
 from .coordinates import rows_of
 from .diagnose import Diagnosed
 from .electrical import NAMES
@@ -79,8 +80,9 @@ def _measured(machine: ReferenceActuator, found: Diagnosed, name: str, equation:
     rec = machine.recordings[name]
     if equation not in QUANTITY:
         return None
-    of = rows_of(State(rec, Point(found.before, name, ())), equation)
-    signal = _signal(rec, equation)
+    state = State(rec, Point(found.before, name, ()))
+    of = rows_of(state, equation)
+    signal = np.asarray(bus.measured(state).value) if equation == "bus" else _signal(rec, equation)
     return signal if of is None else of(signal)
 
 
@@ -92,7 +94,6 @@ def _signal(rec: Signals, equation: str) -> np.ndarray:
         return _inertial(rec)
     signals = {
         "sensor_speed": rec.speed_recorded, "sensor_current": rec.current.sum(axis=1), "position": rec.output,
-        "bus": rec.bus,
     }  # fmt: skip
     return np.asarray(signals[equation])
 

@@ -62,7 +62,7 @@ def _difference(x: np.ndarray) -> np.ndarray:
 def residuals(state: State) -> dict[str, Dual]:
     """Recorded less predicted voltage (V) of each phase."""
     rec = state.rec
-    true = _recorded(state, [v + rise for v, rise in zip(voltages(state), state.rise, strict=True)])
+    true = recorded(state, [v + rise for v, rise in zip(voltages(state), state.rise, strict=True)])
     share = rec.time / rec.time[-1]
     out = {}
     for j, name in enumerate(NAMES):
@@ -75,7 +75,7 @@ def residuals(state: State) -> dict[str, Dual]:
     return out
 
 
-def _recorded(state: State, true: list[Dual]) -> list[Dual]:
+def recorded(state: State, true: list[Dual]) -> list[Dual]:
     """What is recorded of the true voltages: lag, gains, the star point, then the channels' curves."""
     p = state.p
     true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
