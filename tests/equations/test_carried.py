@@ -8,7 +8,7 @@ from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import time_axis
 from emafault.actuator.unlisted import followed, row_of
 from emafault.dataset import simulate_and_measure
-from emafault.diagnosis.described import Described, WithForms, refined
+from emafault.diagnosis.described import Described, WithForms, proposed, refined
 from emafault.diagnosis.forms import FORMS
 from emafault.diagnosis.whitening import Weights
 from emafault.equations.carried import DRIVERS, of_chain, of_form
@@ -203,6 +203,17 @@ def test_a_form_is_as_large_where_an_interval_sweeps_much_of_it(sized, shape, si
     left = (rows[0][1] - rows[1][1])[fast, -1]
     found = np.linalg.lstsq(rows[0][1][fast, :-1], -left, rcond=None)[0]
     assert np.hypot(*found, *[0.0] * (2 - len(found))) == pytest.approx(size, rel=0.05)
+
+
+def test_what_the_motor_s_torque_lacks_about_an_angle_may_be_the_magnet_of_any_phase():
+    machine = machine_of({"a.nc": recorded([])})
+    bump = Described("~b", "bump", "torque", 2, (("centre", 2.0, 0.1, "rad"), ("width", 0.4, 0.1, "rad")), 1.0, 1.0)
+    _, *elsewhere = proposed(machine, [(9.0, bump)])
+    assert [(f.channel, f.equation, f.seen) for f in elsewhere] == [
+        (f"k_{j}", f"electrical_{j}", "torque") for j in "abc"
+    ]
+    friction = Described("~f", "bump", "torque", 1, bump.shape, 1.0, 1.0)
+    assert proposed(machine, [(9.0, friction)]) == [friction]
 
 
 def test_a_coefficient_of_two_equations_is_looked_at_in_both():

@@ -29,7 +29,7 @@ OF_STATE = {
     "control": control, "commutation": commutation,
 }  # fmt: skip
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
-BACK_EMF = 2  # driver of the electrical equations: speed times the shape
+BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and of the torque's, that of the motor
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
@@ -138,13 +138,15 @@ class ReferenceActuator:
 
     def coefficients(self, equation: str, driver: int) -> tuple[str, ...]:
         """Coefficients of other equations as well that a driver of an equation has."""
-        return (f"k_{equation[-1]}",) if equation in electrical.NAMES and driver == BACK_EMF else ()
+        if driver != BACK_EMF or equation not in (*electrical.NAMES, "torque"):
+            return ()
+        return tuple(f"k_{j}" for j in ("abc" if equation == "torque" else equation[-1]))
 
     def place(self, place: str, equation: str) -> tuple[str, float]:
         """Equation that a form in a channel or a coefficient is told in, and the scale of its size."""
         quantity = place.split("_")[0]
         if quantity == "k":
-            return equation, K_SCALE
+            return f"electrical_{place[-1]}", K_SCALE
         noise = next(iter(self.recordings.values())).noise
         name = {"output": "position"}.get(quantity, quantity)
         return "position" if quantity == "output" else f"sensor_{quantity}", STANDS_OUT * float(getattr(noise, name))
