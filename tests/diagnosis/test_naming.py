@@ -70,6 +70,12 @@ def test_a_unit_within_four_tolerances_hardly_speaks_for_its_calibration():
     assert log_evidence(6.0, 4.0) > 10.0
 
 
+def test_what_is_known_of_a_unit_s_value_decides_on_which_side_of_four_tolerances_it_is():
+    """Known to a thirtieth of a tolerance, of which the prior's width within and beyond must not make a whole one."""
+    assert log_evidence(3.7, 4.0) < log_evidence(3.7) - 15.0
+    assert log_evidence(4.3, 4.0) > log_evidence(4.3)
+
+
 def held(
     monkeypatch,
     misfit,

@@ -19,6 +19,7 @@ FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range 
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
 OTHER_FORM = 10  # added to a variant's number, once for each kind of own form that the unit may take
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
+ROUNDING = 1e-6  # of a prior's width, by which the data know a value no better
 TINY = 1e-12  # probability that counts as none
 BEAM = 4
 ADDED = 15  # units tried in addition to a set
@@ -172,17 +173,23 @@ class Search:
         return best, width
 
     def _outside(self, m, width, index, mean, deviation) -> float:
-        """Log of the posterior over the prior mass outside a prior's hole: of a unit's values beyond tolerance."""
+        """Log of the posterior over the prior mass outside a prior's hole: of a unit's values beyond tolerance.
+
+        The value is that within tolerance and what is beyond together, which the data tell from one column: of both
+        posteriors follow the column's error, and that of their sum.
+        """
         c = self.candidates[m]
         k = np.searchsorted(np.sort(index), c.index)
         k = np.argsort(index)[k]
-        # the tolerance has taken its own share of the deviation
-        more = 1.0 + (c.within / width) ** 2
-        x = (mean[k] - self.reduced.fixed[c.index]) / c.sd * more
-        s = np.maximum(deviation[k] / c.sd * more, 1e-9)
+        beyond = width**2
+        both = beyond + c.within**2
+        s = np.minimum(deviation[k] / c.sd, width * (1.0 - ROUNDING))
+        error = np.maximum(beyond**2 / (beyond - s**2) - both, (ROUNDING * width) ** 2)
+        x = (mean[k] - self.reduced.fixed[c.index]) / c.sd * both / beyond
+        spread = np.sqrt(both * error / (both + error))
         low, high = c.hole
-        inside = ndtr((high - x) / s) - ndtr((low - x) / s)
-        before = ndtr(high / width) - ndtr(low / width)
+        inside = ndtr((high - x) / spread) - ndtr((low - x) / spread)
+        before = ndtr(high / np.sqrt(both)) - ndtr(low / np.sqrt(both))
         return float(np.log(np.maximum(1.0 - np.prod(inside), TINY)) - np.log(1.0 - np.prod(before)))
 
     def variants(self, unit: str) -> int:
