@@ -1,6 +1,6 @@
 """How the page says what remains."""
 
-from emafault.equations.page import _remainders
+from emafault.equations.sentences import _remainders
 
 NOISE = " more than noise, not described further."
 

@@ -7,7 +7,7 @@ import pytest
 
 from emafault.actuator.commands import read_command
 from emafault.cli import main
-from emafault.equations.page import separated
+from emafault.equations.sentences import separated
 from emafault.reporting.written import to_json
 
 ENTRY = {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from ..equations import run
 from ..equations.diagnose import Diagnosed
-from ..equations.page import finding
+from ..equations.sentences import finding
 from ..errors import InputError, shown
 from ..io.bench import Bench, check_bench
 from ..io.recording import Recording

@@ -1,4 +1,4 @@
-"""The page of a diagnosis of the reference actuator, and what was found in sentences."""
+"""The page of a diagnosis of the reference actuator."""
 
 import html
 import json
@@ -7,95 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..faults import FAULT_NAMES
+from ..reporting import diagnosis as figures
 from ..reporting.numbers import Numbers, add_numbers
 from ..reporting.page import Page
 from ..reporting.panels import Panel
 from ..reporting.regions import add_regions
 from ..reporting.retrained import MARK
-from .electrical import NAMES
 from .probabilities import basis
 from .quality import in_cells
-from .telling import differing_gains
-from .terms import TERMS
+from .sentences import finding, fitted, separated
 
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
 MOST = 8  # sets in the table
 TOLD_OF = 0.01  # probability from which a set behind the first has its parameters told
-
-
-def finding(verdict: Mapping[str, Any]) -> list[str]:
-    """What was found, a sentence each: the measuring chain first, then the machine, then the controller."""
-    out = [_said(d) for d in verdict["discovered"] if d["form"] != "remainder"]
-    kind, first = verdict["verdict"], verdict["which"][0]
-    if kind in ("explained", "partly") and first["effects"]:
-        sentences = [TERMS[e].SENTENCE for e in first["effects"] if e in TERMS]
-        text = "; ".join(sentences)
-        out.append(f"{text[0].upper()}{text[1:]} ({_fitted(first)}; posterior probability {first['probability']:.3g}).")
-    if verdict["groups"]:
-        names = "; ".join(" or ".join(g).replace("_", " ") for g in verdict["groups"])
-        out.append(f"One of a group that these recordings do not distinguish: {names}.")
-    if kind == "no_gap":
-        p = first["probability"]
-        out.append(
-            "The nominal model within the unit's tolerances accounts for these recordings "
-            f"(posterior probability {p:.3g})."
-        )
-    if kind == "unknown":
-        out.append(
-            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
-            f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
-        )
-    out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
-    for name, g in differing_gains(verdict).items():
-        words = name.replace("_", " ")
-        out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
-    signal = verdict["shrinks"]["signal"]
-    if signal and signal["closed"] is not None:
-        share = 100 * min(signal["closed"], 1.0)
-        out.append(
-            f"On the validation recordings this closes {share:.0f} % of the gap."
-            if share > 0.0
-            else "On the validation recordings this closes nothing of the gap."
-        )
-    return out
-
-
-def _remainders(found: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Their sentences, those that say the same of several phases in one."""
-    phases: dict[str, list[str]] = {}
-    rest = []
-    for d in found:
-        if d["equation"] in NAMES:
-            phases.setdefault(d["sentence"].partition(" leaves ")[2], []).append(d["equation"][-1])
-        else:
-            rest.append(str(d["sentence"]))
-    said = [
-        f"The electrical equations of phases {_listed(sorted(p))} leave {what}"
-        if len(p) > 1
-        else f"The electrical equation of phase {p[0]} leaves {what}"
-        for what, p in phases.items()
-    ]
-    return [*said, *rest]
-
-
-def _listed(words: list[str]) -> str:
-    """Words with commas and an "and"."""
-    return " and ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), words[-1]])
-
-
-def _said(found: Mapping[str, Any]) -> str:
-    if found["another_form_of"] is None:
-        return str(found["sentence"])
-    return f"{found['sentence'][:-1]}: much like another form of {found['another_form_of'].replace('_', ' ')}."
-
-
-def _fitted(entry: Mapping[str, Any]) -> str:
-    parts = []
-    for name, p in entry["parameters"].items():
-        units = "" if p["units"] == "1" else f" {p['units']}"
-        parts.append(f"{name} = {p['value']:z.4g}{units} ({p['low']:z.4g} to {p['high']:z.4g})")
-    return ", ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -113,37 +38,57 @@ def draw(
     following: Callable[[], Sequence[Mapping[str, Any]]] | None = None,
 ) -> Page:
     """The page of one diagnosis; ``following`` gives what to record next, asked once all else is drawn."""
-    # what draws takes half a second to import, and the verdict does not wait
-    from ..reporting import diagnosis as figures
-
     page = Page(f"Where the simulator and bench {verdict['bench']} disagree")
     for sentence in finding(verdict):
         page.paragraph(sentence, "lead")
     page.heading("What these recordings leave open")
     page.parts.append("<ul>" + "".join(f"<li>{html.escape(t)}</li>" for t in _cannot_tell(verdict)) + "</ul>")
-    described = [d for d in verdict["discovered"] if d["form"] != "remainder"]
-    if described:
-        page.heading("What no catalogue lists")
-        rows = [
-            [
-                d["form"].replace("_", " "), d["equation"].replace("_", " "), d["along"].replace("_", " "),
-                _fitted(d), f"{d['probability']:.3f}", "" if d["closed"] is None else f"{d['closed']:.1%}",
-            ]
-            for d in described
-        ]  # fmt: skip
-        columns = ["form", "equation", "along", "parameters with 90 % intervals", "probability", "closes alone"]
-        page.table(columns, rows)
-        curves = [
-            d["curve"] | {"title": f"{d['equation']}: {d['form']}".replace("_", " ")} for d in described if "curve" in d
+    _add_described(page, [d for d in verdict["discovered"] if d["form"] != "remainder"])
+    _add_quality(page, verdict["quality"])
+    page.heading("Where: residual by equation and operating region")
+    add_regions(page, verdict["where"])
+    if detail is not None:
+        _add_charts(page, detail.panels)
+    _add_sets(page, verdict)
+    _add_ladder(page, verdict["shrinks"])
+    _add_controller(page, verdict["controller"])
+    if detail is not None:
+        add_numbers(page, detail.numbers)
+    _add_fault_vectors(page, fault_vectors(verdict, truths))
+    page.parts.append(MARK)
+    _add_next(page, verdict["next_experiment"] if following is None else following())
+    page.heading("Sealed before the validation recordings were opened")
+    page.preformatted(json.dumps(verdict["sealed"], indent=1))
+    return page
+
+
+def _add_described(page: Page, described: Sequence[Mapping[str, Any]]) -> None:
+    if not described:
+        return
+    page.heading("What no catalogue lists")
+    rows = [
+        [
+            d["form"].replace("_", " "), d["equation"].replace("_", " "), d["along"].replace("_", " "),
+            fitted(d), f"{d['probability']:.3f}", "" if d["closed"] is None else f"{d['closed']:.1%}",
         ]
-        if curves:
-            page.figure(
-                "described", figures.draw_described(curves),
-                "What the equation leaves along the form, without it in the model and with it, with 90 % bands.",
-                figures.described_in_words(curves),
-            )  # fmt: skip
+        for d in described
+    ]  # fmt: skip
+    columns = ["form", "equation", "along", "parameters with 90 % intervals", "probability", "closes alone"]
+    page.table(columns, rows)
+    curves = [
+        d["curve"] | {"title": f"{d['equation']}: {d['form']}".replace("_", " ")} for d in described if "curve" in d
+    ]
+    if curves:
+        page.figure(
+            "described", figures.draw_described(curves),
+            "What the equation leaves along the form, without it in the model and with it, with 90 % bands.",
+            figures.described_in_words(curves),
+        )  # fmt: skip
+
+
+def _add_quality(page: Page, quality: Mapping[str, Any]) -> None:
     page.heading("How good the recordings are")
-    cells = in_cells(verdict["quality"])
+    cells = in_cells(quality)
     page.figure(
         "quality", figures.draw_quality(*cells),
         "Noise of each channel (of the voltages, with the inverter's ripple). Colours compare it with the median of "
@@ -151,17 +96,20 @@ def draw(
         "quarter). Bold and framed is what share of the samples is no measurement: clipped, held, spikes, or in steps.",
         figures.quality_in_words(*cells),
     )  # fmt: skip
-    page.heading("Where: residual by equation and operating region")
-    add_regions(page, verdict["where"])
-    if detail is not None:
-        page.heading("Measured and predicted, equation by equation")
-        page.paragraph(
-            "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. From "
-            "top to bottom: the residual averaged over all recordings, which shows what noise hides in single samples; "
-            "measured and predicted signals; single residuals. Residuals are in standard deviations (sd) of the noise, "
-            "which puts nineteen in twenty into the shaded band. Drag to zoom in, double-click to see everything."
-        )
-        page.panels(detail.panels)
+
+
+def _add_charts(page: Page, panels: Sequence[Panel]) -> None:
+    page.heading("Measured and predicted, equation by equation")
+    page.paragraph(
+        "Before is the nominal model with this unit's tolerances fitted, after the leading set of effects. From "
+        "top to bottom: the residual averaged over all recordings, which shows what noise hides in single samples; "
+        "measured and predicted signals; single residuals. Residuals are in standard deviations (sd) of the noise, "
+        "which puts nineteen in twenty into the shaded band. Drag to zoom in, double-click to see everything."
+    )
+    page.panels(panels)
+
+
+def _add_sets(page: Page, verdict: Mapping[str, Any]) -> None:
     page.heading("Which: posterior probability of each set of effects")
     about = (
         "Posterior probabilities are exclusive and sum to one. The gain is that of all recordings fitted together: "
@@ -176,69 +124,61 @@ def draw(
         "; ".join(f"{e['label']}: {100 * e['probability']:.1f} %" for e in entries),
     )  # fmt: skip
     rows = [
-        [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", _fitted(e)]
+        [" + ".join(e["effects"]).replace("_", " ") or "no effect", f"{e['probability']:.4f}", fitted(e)]
         for m, e in enumerate(verdict["which"][:MOST])
         if e.get("parameters") and (m == 0 or e["probability"] >= TOLD_OF)
     ]
     if rows:
         page.table(["set of effects", "posterior probability", "parameters with 90 % intervals"], rows, (0,))
-    if any(verdict["shrinks"].values()):
-        page.heading("How far the gap closes on the validation recordings")
-        page.figure(
-            "how_far",
-            figures.draw_ladder(verdict["shrinks"]),
-            "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: tolerances fitted. "
-            "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
-            figures.ladder_in_words(verdict["shrinks"]),
-        )
+
+
+def _add_ladder(page: Page, shrinks: Mapping[str, Any]) -> None:
+    if not any(shrinks.values()):
+        return
+    page.heading("How far the gap closes on the validation recordings")
+    page.figure(
+        "how_far",
+        figures.draw_ladder(shrinks),
+        "On recordings that took no part. Nominal: no tolerance fitted. Recalibrated: tolerances fitted. "
+        "Placebo: random signatures with as many parameters, fitted. After: with what was found. Floor: the noise.",
+        figures.ladder_in_words(shrinks),
+    )
+
+
+def _add_controller(page: Page, gains: Mapping[str, Mapping[str, Any]]) -> None:
     page.heading("Controller")
     rows = [
         [
-            n.replace("_", " "),
-            f"{g['nominal']:.4g}",
-            f"{g['value']:.4g}",
-            f"{g['low']:.4g} to {g['high']:.4g}",
+            n.replace("_", " "), f"{g['nominal']:.4g}", f"{g['value']:.4g}", f"{g['low']:.4g} to {g['high']:.4g}",
             g["units"],
         ]
-        for n, g in verdict["controller"].items()
-    ]
+        for n, g in gains.items()
+    ]  # fmt: skip
     page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
-    if detail is not None:
-        add_numbers(page, detail.numbers)
-    if verdict["fault_vector"]:
-        page.heading("Fault vector before and after")
-        groups = fault_vectors(verdict, truths)
-        page.figure(
-            "faults",
-            figures.draw_faults(groups),
-            "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
-            figures.faults_in_words(groups),
-        )
-    page.parts.append(MARK)
+
+
+def _add_fault_vectors(page: Page, groups: Sequence[Mapping[str, Any]]) -> None:
+    if not groups:
+        return
+    page.heading("Fault vector before and after")
+    page.figure(
+        "faults",
+        figures.draw_faults(groups),
+        "Estimated jointly with the unit and what was found; 90 % intervals. The line is the truth, where known.",
+        figures.faults_in_words(groups),
+    )
+
+
+def _add_next(page: Page, experiments: Sequence[Mapping[str, Any]]) -> None:
     page.heading("What to record next")
     rows = [
         [
             e["command"], f"{e['ambient_temperature']:g} °C",
             separated(e["separates"]), f"{e['expected_odds']:.3g}",
         ]
-        for e in (verdict["next_experiment"] if following is None else following())
+        for e in experiments
     ]  # fmt: skip
     page.table(["command", "ambient temperature", "distinguishes", "expected Bayes factor"], rows)
-    page.heading("Sealed before the validation recordings were opened")
-    page.parts.append(f"<pre>{html.escape(json.dumps(verdict['sealed'], indent=1))}</pre>")
-    return page
-
-
-def separated(sets: Sequence[str]) -> str:
-    """What a recording distinguishes: the leading set from a rival, each as the verdict file joins its effects."""
-    first, rival = (s.split("+") for s in sets)
-    leading = _joined(first)
-    more = [e for e in rival if e not in first]
-    return f"{leading} from {f'{leading} with {_joined(more)}' if set(first) < set(rival) else _joined(rival)}"
-
-
-def _joined(effects: Sequence[str]) -> str:
-    return " and ".join(e.replace("_", " ") for e in effects)
 
 
 def ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:

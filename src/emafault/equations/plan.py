@@ -14,8 +14,8 @@ from ..io.bench import bench_name
 from ..paths import results_folder
 from ..places import file_name, refuse_folder, refuse_irregular
 from ..plain import read_json
-from .page import separated
 from .run import diagnosed
+from .sentences import separated
 
 HEADER = "time_s,position_rad"
 PLAYED = 1e-3  # s between two positions of a motion

@@ -20,8 +20,8 @@ from .curves import panels
 from .diagnose import Diagnosed, diagnose
 from .fitted import numbers
 from .handover import experiment_text
-from .page import Detail, draw, finding
 from .probabilities import checked_on
+from .sentences import finding
 
 PROCESSES = 2
 
@@ -125,6 +125,9 @@ def write(found: Diagnosed, bench: Bench, folder: Path, experiment: str | Path |
     """Write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``, the last also to ``experiment``."""
     verdict = found.verdict
     with beside(found, "next_experiments") as following:  # takes as long as the pictures
+        # what draws takes half a second to import, and the verdict does not wait
+        from .page import Detail, draw
+
         truths = {n: r.fault for n, r in bench.recordings.items()}
         page = draw(verdict, truths, Detail(panels(found), numbers(found)), following)
         verdict["next_experiment"] = following()
