@@ -82,7 +82,6 @@ def held(
     whole,
     explored,
     named,
-    described=(),
     another=-np.inf,
     change=-50.0,
     dispersion=1.0,
@@ -108,13 +107,12 @@ def held(
         less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)), units=units,
     )  # fmt: skip
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
-    monkeypatch.setattr(held_out, "_misfit", lambda ladder, bench, fit, m: misfit[m.units])
+    monkeypatch.setattr(held_out, "_misfit", lambda explored, m: misfit[m.units])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
     monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect: another)
-    return held_out.held_to_account(
-        None, everything, named, None, SimpleNamespace(described=[SimpleNamespace(id=d) for d in described]),
-        SimpleNamespace(models=explored, search=search), dict(wandering),
-    )  # fmt: skip
+    explored = held_out.Explored(None, SimpleNamespace(models=explored, search=search), None)
+    kept, found = held_out.held_to_account(None, everything, named, explored, dict(wandering))
+    return kept, found.ratios, found.changes
 
 
 def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch):
@@ -197,7 +195,7 @@ def test_a_name_whose_score_is_overdispersed_is_told_by_less(monkeypatch):
 def test_a_described_form_is_told_where_the_held_out_part_confirms_it(monkeypatch, after, told):
     misfit = {("~order",): after, (): 100.0}
     whole = [model(0.0, "~order"), model(-50.0)]
-    kept, ratios, _ = held(monkeypatch, misfit, whole, [model(0.0, "~order"), model(-2.0)], [], ["~order"])
+    kept, ratios, _ = held(monkeypatch, misfit, whole, [model(0.0, "~order"), model(-2.0)], [])
     assert ratios["~order"] == 0.5 * (100.0 - after)
     assert ("~order" in kept[0].units) == told
     if not told:
@@ -245,7 +243,8 @@ def test_remainders_are_integrated_over_what_the_explored_recordings_leave_open(
     )  # fmt: skip
     bench = SimpleNamespace(inserted=lambda m, normal: SimpleNamespace(values={}))
     left = Model((Choice("remainder:torque", 0, width),), 0.0, 0.0, {}, {})
-    found = held_out._misfit(ladder, bench, SimpleNamespace(search=search, normal=None), left)
+    explored = held_out.Explored(bench, SimpleNamespace(search=search, normal=None), ladder)
+    found = held_out._misfit(explored, left)
     posterior = np.zeros((3, 3))
     posterior[:2, :2] = np.linalg.inv(M + np.eye(2) / width**2)
     posterior[2, 2] = width**2

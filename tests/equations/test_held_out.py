@@ -55,7 +55,7 @@ def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():
     units = {"voltage_gain": Unit("voltage_gain", "structural", ("electrical",), [])}
     search = SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in explains])
     model = fit((("voltage_gain", 0), ("cogging", 0)))
-    assert set(_less(SimpleNamespace(search=search), model, "voltage_gain", True).units) == {
+    assert set(_less(search, model, "voltage_gain", True).units) == {
         "cogging", "remainder:electrical_b",
     }  # fmt: skip
-    assert _less(SimpleNamespace(search=search), model, "voltage_gain", False).units == ("cogging",)
+    assert _less(search, model, "voltage_gain", False).units == ("cogging",)

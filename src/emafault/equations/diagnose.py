@@ -19,7 +19,7 @@ from ..effects import EFFECTS
 from ..effects.scaling import scaled
 from ..errors import InputError
 from ..io.recording import Recording
-from .held_out import HeldOut, held_to_account
+from .held_out import Explored, held_to_account
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import seen, told
@@ -121,14 +121,13 @@ def diagnose(
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
-    ladder = Ladder(every, confirm)
     named = read(all_fit.models, units, observed).named
     wanders = wandering.log_odds(every, confirm)
-    models, ratios, changes = held_to_account(every, all_fit, named, ladder, bench, fit, wanders)
+    explored = Explored(bench, fit, Ladder(every, confirm))
+    models, held_out = held_to_account(every, all_fit, named, explored, wanders)
     all_fit = replace(all_fit, models=models)
     quality = {n: quality[n] if n in quality else seen(r) for n, r in recordings.items()}
     final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders)
-    held_out = HeldOut(ladder, bench, fit, ratios, changes)
     fitted = Fitted(whole, every, all_fit, final, held_out)
     return Diagnosed.of(fitted, verdict_of(name, split, fitted, sealed, recordings, quality), own)
 

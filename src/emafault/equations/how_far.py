@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.closure import Ladder, closed, coefficients, placebo, rms, rows
+from ..diagnosis.closure import closed, coefficients, placebo, rms, rows
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import read
@@ -13,7 +13,7 @@ from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..io.recording import Recording
 from . import electrical
-from .held_out import HeldOut
+from .held_out import Explored, HeldOut
 from .parameters import FAULTS
 from .point import SEEDED
 from .telling import Z
@@ -43,23 +43,24 @@ def shrinks(
     """
     if held_out is None:
         return {"signal": None, "features": None, "fault_vector": None}
-    ladder, explored, fit = held_out.ladder, held_out.explored, held_out.fit
+    explored = held_out.explored
+    ladder, fit = explored.ladder, explored.fit
     reading = read(fit.models, fit.search.units.values())
     leading = reading.sets[0][2] if reading.named or reading.groups else fit.models[0]
     models = _insertable(fit, leading, told)
     model = models[0]
     off = {n: p.off for n, p in bench.parameters.items()}
-    nominal_unit = null(explored, fit)
+    nominal_unit = null(explored.bench, fit)
     recalibrated = {**off, **nominal_unit.values()}
     nominal = {n: recalibrated[n] if n.split("@")[0].removeprefix(SEEDED) in FAULTS else v for n, v in off.items()}
     base = ladder.blocks(recalibrated, remainders=True)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(
-        (_inserted(ladder, explored, fit, m, recalibrated) for m in models),
+        (_inserted(explored, m, recalibrated) for m in models),
         key=lambda found: rms(found[0]),
     )
     at_nominal = ladder.blocks(nominal, remainders=True)
-    units = {u.id: u for u in explored.units}
+    units = {u.id: u for u in explored.bench.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
     at_null = nominal_unit.reduce(nominal_unit.normal(nominal_unit.linearise()))
@@ -95,13 +96,13 @@ def _insertable(fit: Fit, leading: Model, told: Collection[str]) -> list[Model]:
 
 
 def _inserted(
-    ladder: Ladder, explored: Bench, fit: Fit, model: Model, recalibrated: Mapping[str, float]
+    explored: Explored, model: Model, recalibrated: Mapping[str, float]
 ) -> tuple[list[White], dict[str, float]]:
     """Blocks of the confirm recordings with a set inserted, and its values."""
-    inserted = explored.inserted(model, fit.normal)
+    inserted = explored.bench.inserted(model, explored.fit.normal)
     after = {**recalibrated, **inserted.values}
     mine = [n for n in model.deviations if is_parameter(n)]
-    return ladder.blocks(after, remainders=True, also=mine, inserted=inserted), after
+    return explored.ladder.blocks(after, remainders=True, also=mine, inserted=inserted), after
 
 
 def _feature_ladder(
