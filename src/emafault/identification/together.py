@@ -68,44 +68,30 @@ def together(
     y = np.log(features / healthy)
     weight = np.linalg.inv(covariance / (features[:, :, None] * features[:, None, :]))
     B = _root(shared)
-    lags = bool(alpha_m and known.lag_deviation)
-    x = np.full((n, 7), known.lag)
     at_nominal = features * nominal_nine(actuator)[:width] / healthy
-    x[:, :6] = inverse(at_nominal[:, :3], at_nominal[:, 3:6], actuator, alpha_m, known.lag)
-    x[:, :SHARED] = np.mean(x[:, :SHARED], axis=0)
-    u, k = np.zeros(B.shape[1]), B.shape[1]
-    first = SHARED + k  # of the unknowns of recordings
-    size = first + n * (2 if lags else 1)
-    prior = np.zeros(size)
-    prior[SHARED:first] = 1.0
-    prior[first + n :] = known.lag_deviation**-2 if lags else 0.0
+    alone = inverse(at_nominal[:, :3], at_nominal[:, 3:6], actuator, alpha_m, known.lag)
+
+    lags = bool(alpha_m and known.lag_deviation)
+    k = B.shape[1]
+    first = SHARED + k  # of the unknowns that each recording has of its own
+    of_u = slice(SHARED, first)
+    unknown = np.concatenate(
+        [np.mean(alone[:, :SHARED], axis=0), np.zeros(k), alone[:, 5], np.full(n if lags else 0, known.lag)]
+    )
+    mean, precision = np.zeros(len(unknown)), np.zeros(len(unknown))
+    precision[of_u] = 1.0
+    if lags:
+        mean[first + n :], precision[first + n :] = known.lag, known.lag_deviation**-2
     for _ in range(STEPS):
-        value, J = laws(x, actuator.copper_coefficient, alpha_m)
-        left = y - value[:, :width] - B @ u
+        value, J = laws(_by_recording(unknown, first, n, known.lag), actuator.copper_coefficient, alpha_m)
+        left = y - value[:, :width] - B @ unknown[of_u]
         common = np.concatenate([J[:, :width, :SHARED], np.broadcast_to(B, (n, width, k))], axis=2)
-        own = J[:, :width, 5 : 7 if lags else 6]
-        normal, pull = np.diag(prior), np.zeros(size)
-        score = np.swapaxes(common, 1, 2) @ weight
-        normal[:first, :first] += np.sum(score @ common, axis=0)
-        pull[:first] = np.sum(score @ left[..., None], axis=0)[:, 0]
-        cross, inner = score @ own, np.swapaxes(own, 1, 2) @ weight
-        for r in range(n):
-            at = first + r + n * np.arange(own.shape[2])
-            normal[:first, at] += cross[r]
-            normal[at, :first] += cross[r].T
-            normal[np.ix_(at, at)] += inner[r] @ own[r]
-            pull[at] += inner[r] @ left[r]
-        pull[SHARED:first] -= u
-        if lags:
-            pull[first + n :] -= prior[first + n :] * (x[:, 6] - known.lag)
-        scale = np.sqrt(np.diagonal(normal))
-        spread = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
-        step = spread @ pull
-        x[:, :SHARED] += step[:SHARED]
-        u = u + step[SHARED:first]
-        x[:, 5] += step[first : first + n]
-        if lags:
-            x[:, 6] += step[first + n :]
+        information, score = _normal_equations(common, J[:, :width, 5 : 7 if lags else 6], weight, left)
+        information += np.diag(precision)
+        scale = np.sqrt(np.diagonal(information))
+        spread = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+        unknown = unknown + spread @ (score - precision * (unknown - mean))
+    x, u = _by_recording(unknown, first, n, known.lag), unknown[of_u]
     value, _ = laws(x, actuator.copper_coefficient, alpha_m)
     left = y - value[:, :width] - B @ u
     shares = np.einsum("ni,nij,nj->n", left, weight, left)
@@ -114,6 +100,44 @@ def together(
     kept = [np.r_[0:SHARED, first + r] for r in range(n)]
     own_spread = np.stack([spread[np.ix_(rows, rows)] for rows in kept])
     return Joint(x[:, :6], own_spread, float(np.sum(shares) + u @ u), n * (width - 1) - SHARED, shares)
+
+
+def _by_recording(unknown: np.ndarray, first: int, n: int, lag: float) -> np.ndarray:
+    """(recording, 7) N, xi, dT and lag; the lag is a given one where it is not among the unknowns."""
+    x = np.full((n, 7), lag)
+    x[:, :SHARED] = unknown[:SHARED]
+    x[:, 5] = unknown[first : first + n]
+    if len(unknown) > first + n:
+        x[:, 6] = unknown[first + n :]
+    return x
+
+
+def _normal_equations(
+    common: np.ndarray, own: np.ndarray, weight: np.ndarray, left: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information and score of the unknowns that recordings have in common and, behind them, of each one's own.
+
+    Parameters
+    ----------
+    common, own : (recording, width, unknown) derivatives of the data; of the own unknowns the first of all recordings
+        comes before the second of all
+    weight : (recording, width, width) inverse covariance of the data
+    left : (recording, width) residual
+    """
+    n, first, each = len(own), common.shape[2], own.shape[2]
+    size = first + n * each
+    information, score = np.zeros((size, size)), np.zeros(size)
+    weighted, own_weighted = np.swapaxes(common, 1, 2) @ weight, np.swapaxes(own, 1, 2) @ weight
+    information[:first, :first] = np.sum(weighted @ common, axis=0)
+    score[:first] = np.sum(weighted @ left[..., None], axis=0)[:, 0]
+    cross = weighted @ own
+    for r in range(n):
+        at = first + r + n * np.arange(each)
+        information[:first, at] = cross[r]
+        information[at, :first] = cross[r].T
+        information[np.ix_(at, at)] = own_weighted[r] @ own[r]
+        score[at] = own_weighted[r] @ left[r]
+    return information, score
 
 
 def _root(covariance: np.ndarray) -> np.ndarray:
