@@ -145,23 +145,37 @@ def read_recording(path: str | Path) -> Recording:
 
 
 def _read_open(path: Path, file) -> Recording:
-    def values(name: str, dims: tuple[str, ...], unit: str | None) -> np.ndarray:
-        variable = file.variables[name]
-        if variable.dimensions != dims:
-            raise InputError(f"{name} has dimensions {variable.dimensions}, the format asks for {dims}")
-        got = getattr(variable, "units", None)
-        if unit is not None and got != unit:
-            raise InputError(f"{name} has unit '{got}', the format asks for '{unit}'")
-        if not np.issubdtype(variable.dtype, np.number):
-            raise InputError(f"{name} is not numeric")
-        data: np.ndarray = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
-        if not np.all(np.isfinite(data)):
-            raise InputError(f"{name} holds NaN, infinite or missing values; none are accepted")
-        largest = LARGEST.get(unit or "", np.inf)
-        if np.any(np.abs(data) > largest):
-            raise InputError(f"{name} reaches {np.max(np.abs(data)):.3g} {unit}, accepted is up to {largest:g} {unit}")
-        return data
+    _check_layout(file)
+    time = _values(file, "time", ("time",), "s")
+    _check_time(time)
+    data: dict[str, np.ndarray | None] = {}
+    known: dict[str, dict[str, Any]] = {}
+    for name, (phased, unit, _, _) in VARIABLES.items():
+        if name not in file.variables:
+            data[name] = None
+            continue
+        data[name] = np.ascontiguousarray(_values(file, name, ("phase", "time") if phased else ("time",), unit).T)
+        known[name] = _known(file.variables[name])
+    reference = known["phase_voltage"].get("reference", "star")
+    if reference not in REFERENCES:
+        raise InputError(f"phase_voltage has the reference '{reference}', read are {' and '.join(REFERENCES)}")
+    speed = data["rotor_speed"]
+    assert speed is not None
+    if not np.any(speed != 0.0):
+        raise InputError("rotor_speed never leaves zero; a recording in motion is needed")
+    return Recording(
+        time=time,
+        ambient_temperature=float(_values(file, "ambient_temperature", (), "degC")),
+        fault=_fault(file) if "fault" in file.variables else None,
+        attributes=_attributes(file),
+        known={name: said for name, said in known.items() if said},
+        name=path.name,
+        **data,  # type: ignore[arg-type]
+    )
 
+
+def _check_layout(file) -> None:
+    """Refuse a file that lacks a variable or is no single recording of three phases."""
     required = ["time", *(n for n, spec in VARIABLES.items() if spec[2]), "ambient_temperature"]
     for name in required:
         if name not in file.variables:
@@ -170,7 +184,29 @@ def _read_open(path: Path, file) -> Recording:
         raise InputError("has a run dimension; a dataset is not a recording, one run per file is accepted")
     if "phase" not in file.dimensions or len(file.dimensions["phase"]) != 3:
         raise InputError("the dimension phase must have the three entries a, b, c")
-    time = values("time", ("time",), "s")
+
+
+def _values(file, name: str, dims: tuple[str, ...], unit: str | None) -> np.ndarray:
+    """A variable's values: of the format's dimensions and unit, finite, and no larger than any actuator has."""
+    variable = file.variables[name]
+    if variable.dimensions != dims:
+        raise InputError(f"{name} has dimensions {variable.dimensions}, the format asks for {dims}")
+    got = getattr(variable, "units", None)
+    if unit is not None and got != unit:
+        raise InputError(f"{name} has unit '{got}', the format asks for '{unit}'")
+    if not np.issubdtype(variable.dtype, np.number):
+        raise InputError(f"{name} is not numeric")
+    data: np.ndarray = np.ma.filled(np.ma.asarray(variable[...], dtype=float), np.nan)
+    if not np.all(np.isfinite(data)):
+        raise InputError(f"{name} holds NaN, infinite or missing values; none are accepted")
+    largest = LARGEST.get(unit or "", np.inf)
+    if np.any(np.abs(data) > largest):
+        raise InputError(f"{name} reaches {np.max(np.abs(data)):.3g} {unit}, accepted is up to {largest:g} {unit}")
+    return data
+
+
+def _check_time(time: np.ndarray) -> None:
+    """Refuse times that are too few or too short, or not at one constant interval."""
     if len(time) < 2:
         raise InputError(f"time has {len(time)} samples; at least {MINIMUM_SAMPLES} are needed")
     steps = np.diff(time)
@@ -183,45 +219,33 @@ def _read_open(path: Path, file) -> Recording:
         raise InputError(f"holds {step * len(time):.3g} s of data; at least {MINIMUM_DURATION} s are needed")
     if len(time) < MINIMUM_SAMPLES:
         raise InputError(f"time has {len(time)} samples; at least {MINIMUM_SAMPLES} are needed")
-    data: dict[str, np.ndarray | None] = {}
-    known: dict[str, dict[str, Any]] = {}
-    for name, (phased, unit, _, _) in VARIABLES.items():
-        if name not in file.variables:
-            data[name] = None
-            continue
-        array = values(name, ("phase", "time") if phased else ("time",), unit)
-        data[name] = np.ascontiguousarray(array.T)
-        said = file.variables[name].ncattrs()
-        known[name] = {k: file.variables[name].getncattr(k) for k in ("noise", *KNOWN.get(name, ())) if k in said}
-        noise = known[name].get("noise", 1.0)
-        if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
-            raise InputError(f"{name} has noise '{noise}', accepted is a positive number in its unit")
-    reference = known["phase_voltage"].get("reference", "star")
-    if reference not in REFERENCES:
-        raise InputError(f"phase_voltage has the reference '{reference}', read are {' and '.join(REFERENCES)}")
-    speed = data["rotor_speed"]
-    assert speed is not None
-    if not np.any(speed != 0.0):
-        raise InputError("rotor_speed never leaves zero; a recording in motion is needed")
-    ambient = float(values("ambient_temperature", (), "degC"))
-    fault = values("fault", ("component",), None) if "fault" in file.variables else None
-    if fault is not None and fault.shape != (6,):
+
+
+def _known(variable) -> dict[str, Any]:
+    """What a file says of a variable beyond the format: see ``KNOWN``."""
+    said = variable.ncattrs()
+    known = {k: variable.getncattr(k) for k in ("noise", *KNOWN.get(variable.name, ())) if k in said}
+    noise = known.get("noise", 1.0)
+    if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
+        raise InputError(f"{variable.name} has noise '{noise}', accepted is a positive number in its unit")
+    return known
+
+
+def _fault(file) -> np.ndarray:
+    fault = _values(file, "fault", ("component",), None)
+    if fault.shape != (6,):
         raise InputError(f"fault has {fault.size} components, the format asks for 6")
-    if fault is not None and np.any(np.abs(fault) > LARGEST_FAULT):
+    if np.any(np.abs(fault) > LARGEST_FAULT):
         raise InputError(f"fault is {fault.tolist()}, accepted is up to {LARGEST_FAULT.tolist()}")
+    return fault
+
+
+def _attributes(file) -> dict[str, str]:
     attributes = {key: str(file.getncattr(key)) for key in file.ncattrs()}
     health = attributes.get("health", "unknown")
     if health not in ("healthy", "unknown", "seeded"):
         raise InputError(f"health is '{health}', accepted are healthy, unknown and seeded")
-    return Recording(
-        time=time,
-        ambient_temperature=ambient,
-        fault=fault,
-        attributes=attributes,
-        known={name: said for name, said in known.items() if said},
-        name=path.name,
-        **data,  # type: ignore[arg-type]
-    )
+    return attributes
 
 
 def recordings_in(paths: Mapping[str, Path] | list[str | Path]) -> list[Path]:
