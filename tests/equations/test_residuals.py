@@ -1,14 +1,15 @@
 """At the simulated point the residual of every equation is the sensors' noise, whatever effect is on."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.whitening import whiten
 from emafault.effects import EFFECTS
 
-from .conftest import COMMANDS, machine_of, recorded
+from .conftest import COMMANDS, NOISE, machine_of, recorded
 
 #: a clearly visible size of each effect, and the block of rows in which it shows
 SIZES = {
@@ -153,6 +154,17 @@ def test_where_the_regulator_switches_no_voltage_is_taken_for_the_supply(command
     for interval in (1e-4, 1e-3):
         recording = replace(recorded(command, interval=interval), bus_voltage=None)
         machine = machine_of({"a.nc": recording})
+        assert all(b.equation != "bus" for b in machine.blocks(truth(machine, recording), "a.nc"))
+
+
+def test_the_largest_swing_of_the_ripple_at_a_constant_speed_is_no_supply():
+    steady, quiet = {"amplitude": 0.06, "speed": 0.28}, SensorNoise(**{k: 0.5 * x for k, x in asdict(NOISE).items()})
+    for seed in range(3):
+        recording = recorded(
+            "reversal", {"friction_level": {"scale": 1.97}}, seed=seed, interval=1e-4, theta_0=0.7 + seed, noise=quiet,
+            settings=steady,
+        )  # fmt: skip
+        machine = machine_of({"a.nc": replace(recording, bus_voltage=None)})
         assert all(b.equation != "bus" for b in machine.blocks(truth(machine, recording), "a.nc"))
 
 

@@ -2,7 +2,8 @@
 between the two phases that conduct is the supply's.
 
 No voltage is beyond the supply's, and a mean over an interval in which the regulator switches is anywhere below it.
-Those over intervals in which it does not pile up at one value, within the sensors' noise, with none above.
+Those over intervals in which it does not pile up at one value, within the sensors' noise, with none above, whatever
+the pair needs at its speed and current. About a constant speed the largest swing of the ripple makes a pile as well.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from .terms import bus_resistance
 
 SPREAD = 3.0  # standard deviations of a line voltage, that a pile reaches to either side
 CHANCE = 1e-6  # that as many would lie there if they were spread as those below
+VARIED = 2.0  # times the width of a pile, that what the pair needs in it must vary by
 SAGS = 25  # resistances of the supply that are tried
 WORST = 0.25  # of the supply's voltage, that the largest current takes at the last of them
 
@@ -55,7 +57,15 @@ def _saturated(rec: Signals) -> Saturated | None:
     worst = WORST * rec.actuator.bus_voltage / rec.actuator.current_limit
     tried = (_pile(line + R * sag, candidates, noise) for R in np.linspace(0.0, worst, SAGS))
     best = min(tried, key=lambda found: found[0])
+    low, high = np.quantile(_needed(rec)[best[1]], [0.1, 0.9])
+    if high - low < VARIED * 2.0 * SPREAD * noise:
+        return None
     return Saturated(best[1], pair) if best[0] < np.log(CHANCE / SAGS) else None
+
+
+def _needed(rec: Signals) -> np.ndarray:
+    """(sample,) voltage of the pair's back-EMF and resistance (V)."""
+    return 2.0 * (rec.actuator.back_emf * np.abs(rec.speed) + rec.actuator.resistance * rec.level)
 
 
 def _pile(line: np.ndarray, candidates: np.ndarray, noise: float) -> tuple[float, np.ndarray]:

@@ -70,7 +70,7 @@ def recording_of(
     entry = raw.entry
     bus = raw.single.get("bus_voltage")
     if bus is None:
-        raw.lost.append("no bus voltage: the supply cannot be judged")
+        raw.lost.append("no bus voltage: the supply is judged only where the motor leaves it no headroom")
     if "rotor_speed" not in raw.single:
         raw.lost.append(
             "no rotor_speed: it is the rate of rotor_angle, and a fault of a speed sensor cannot be detected"
