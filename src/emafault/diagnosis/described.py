@@ -208,7 +208,7 @@ def _elsewhere(machine, form: Described) -> list[Described]:
         names += machine.coefficients(form.equation, form.driver)
     out = []
     for place in names:
-        equation, scale = machine.place(place, form.equation)
+        equation, scale = machine.place(place)
         name = f"{form.id}_{place}"
         out.append(
             replace(

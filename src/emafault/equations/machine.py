@@ -142,7 +142,7 @@ class ReferenceActuator:
             return ()
         return tuple(f"k_{j}" for j in ("abc" if equation == "torque" else equation[-1]))
 
-    def place(self, place: str, equation: str) -> tuple[str, float]:
+    def place(self, place: str) -> tuple[str, float]:
         """Equation that a form in a channel or a coefficient is told in, and the scale of its size."""
         quantity = place.split("_")[0]
         if quantity == "k":
@@ -160,7 +160,7 @@ class ReferenceActuator:
             return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
         self.prepare(name, off)
         before = self._recording(off, rec, ())
-        step = self.place(place, "")[1] / STANDS_OUT
+        step = self.place(place)[1] / STANDS_OUT
         found: dict[str, list[np.ndarray]] = {b.equation: [] for b in before}
         for row in x:
             for b, at in zip(before, self._recording(off, rec.less(place, step * row), ()), strict=True):

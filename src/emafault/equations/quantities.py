@@ -151,7 +151,15 @@ def _resistances(state: State) -> None:
     drive = sum(
         (value_of(state.k[j]) * value_of(state.conducting[j]) * value_of(state.current[j]) for j in range(3)), 0.0
     )
-    state.bus_current = (loss + drive * rec.rate + _stored(state)) / (a.bus_voltage if rec.bus is None else rec.bus)
+    power = loss + drive * rec.rate + _stored(state)
+    state.bus_current = power / (_supply(state, power) if rec.bus is None else rec.bus)
+
+
+def _supply(state: State, power: np.ndarray) -> np.ndarray:
+    """(sample,) voltage of a supply that is not recorded, under this power, at the point (V)."""
+    unloaded = float(value_of(_sum(state, "supply")))
+    sag = np.asarray(value_of(_sum(state, "sag", state.rec, power / unloaded)))
+    return unloaded - sag
 
 
 def _stored(state: State) -> np.ndarray:

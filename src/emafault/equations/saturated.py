@@ -9,7 +9,7 @@ the pair needs at its speed and current. About a constant speed the largest swin
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import poisson
+from scipy.special import xlogy
 
 from . import electrical
 from .dual import Dual
@@ -18,7 +18,7 @@ from .signals import Signals
 from .terms import bus_resistance
 
 SPREAD = 3.0  # standard deviations of a line voltage, that a pile reaches to either side
-CHANCE = 1e-6  # that as many would lie there if they were spread as those below
+CHANCE = 1e-6  # of as many there, were they spread as those below
 VARIED = 2.0  # times the width of a pile, that what the pair needs in it must vary by
 SAGS = 25  # resistances of the supply that are tried
 WORST = 0.25  # of the supply's voltage, that the largest current takes at the last of them
@@ -69,7 +69,11 @@ def _needed(rec: Signals) -> np.ndarray:
 
 
 def _pile(line: np.ndarray, candidates: np.ndarray, noise: float) -> tuple[float, np.ndarray]:
-    """Log probability of as many values at the top by chance, and (sample,) which these are."""
+    """Log probability of as many values at the top by chance, at most, and (sample,) which these are.
+
+    Chernoff's bound of a Poisson count (Mitzenmacher and Upfal 2017, Probability and Computing, theorem 5.4), which
+    does not vanish for a large pile.
+    """
     width = 2.0 * SPREAD * noise
     top = float(line[candidates].max())
     middle = float(np.median(line[candidates & (line > top - width)]))
@@ -78,7 +82,8 @@ def _pile(line: np.ndarray, candidates: np.ndarray, noise: float) -> tuple[float
     below = int((candidates & (line <= middle - 0.5 * width) & (line > middle - 2.5 * width)).sum())
     # of the density below, estimated from twice the width; what lies above the supply belongs to no pile
     expected = 0.5 * (below + 1.0) + 2.0 * above
-    return float(poisson.logsf(int(pile.sum()) - 1, expected)), pile
+    excess = max(pile.sum() / expected, 1.0)
+    return float(expected * (excess - 1.0 - xlogy(excess, excess))), pile
 
 
 def line_voltage(state: State, found: Saturated) -> Dual:
@@ -94,4 +99,4 @@ def line_voltage(state: State, found: Saturated) -> Dual:
 
 def dropped(rec: Signals, found: Saturated) -> np.ndarray:
     """(sample,) what the switches of both phases take of the supply's voltage (V)."""
-    return 2.0 * rec.actuator.switch_resistance * 0.5 * (found.pair * rec.current).sum(axis=1)
+    return rec.actuator.switch_resistance * (found.pair * rec.current).sum(axis=1)

@@ -9,8 +9,8 @@ from .point import State, effect_name
 from .signals import Signals, odd
 from .terms import with_hook
 
-BESIDE = 1e-2  # s
-REACHES = 3.0  # standard deviations of the noise
+BESIDE = 1e-2  # s, before and after a sample, between which the speed must sweep over what noise reaches
+REACHES = 3.0  # standard deviations, that the noise of a speed reaches to either side
 LITTLE = 0.01  # of the variance: covariances below it do not count
 
 
