@@ -94,6 +94,28 @@ def test_workers_share_a_journal_and_resume_after_a_kill(data, tmp_path):
     assert len(trials) == asked  # neither fewer for the killed trial nor more for the second worker
 
 
+def test_a_trial_too_many_is_given_back(data, tmp_path, monkeypatch):
+    wanted, sampler, others = settings(4), search._sampler, []
+
+    def beaten(*arguments):  # another worker asks for the last trial after this one has counted, before it asks
+        study = search.open_study(tmp_path / "journal", search.study_name(wanted, *data))
+        if arguments[2] == 3 and not others:
+            others.append(study.ask())
+        elif others:
+            raise AssertionError("asked for more than is missing")
+        return sampler(*arguments)
+
+    def wait(_):  # the other worker's trial ends meanwhile
+        for key, spec in SPACE.items():
+            search._suggest(others[0], key, spec)
+        search.open_study(tmp_path / "journal", search.study_name(wanted, *data)).tell(others[0].number, (0.5, 10))
+
+    monkeypatch.setattr(search, "_sampler", beaten)
+    monkeypatch.setattr(search.time, "sleep", wait)
+    assert search.run_worker(tmp_path / "journal", wanted, *data) == 3
+    assert len(search.finished(tmp_path / "journal", wanted, *data)) == 4
+
+
 def test_a_search_that_was_killed_goes_on_as_it_would_have(data, tmp_path):
     class Killed(Exception):
         pass

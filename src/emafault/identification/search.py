@@ -330,6 +330,9 @@ def run_worker(
         study.sampler = _sampler(settings, worker, complete, repeated)
         trial = study.ask()
         trial.set_user_attr("owner", this_process())
+        if _asked_before(study, trial) >= settings.trials:  # workers that counted at once have asked for the last one
+            _tell(study, trial, state=TrialState.FAIL)
+            continue
         values = {key: _suggest(trial, key, spec) for key, spec in sorted(settings.space.items())}
         twin = next((t for t in trials if t.params == values), None)
         if twin is not None and repeated < _REPEATS:
@@ -341,6 +344,14 @@ def run_worker(
         with _beating(trial):
             found = known or trial_error(settings, values, features, faults, width)
         done_here += _tell(study, trial, found)
+
+
+def _asked_before(study, trial) -> int:
+    """How many trials, finished or running, were asked for before this one: the storage numbers them in turn."""
+    from optuna.trial import TrialState
+
+    counted = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.RUNNING))
+    return sum(other.number < trial.number for other in counted)
 
 
 def _sampler(settings: SearchSettings, worker: int, complete: int, repeated: int):
