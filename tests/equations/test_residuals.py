@@ -205,6 +205,25 @@ def test_cogging_is_as_large_where_an_interval_sweeps_a_period_of_it():
     assert mean_squares(machine, at)["torque"] < 1.2
 
 
+def test_a_zero_of_the_angle_by_the_voltages_is_off_by_its_error():
+    off, poles = 4e-3, 4
+    plain = recorded("reversal")
+    recording = replace(plain, rotor_angle=plain.rotor_angle + off / poles, known={"rotor_angle": {"zero_error": 2e-3}})
+    machine = machine_of({"a.nc": recording})
+    at = truth(machine, recording)
+    assert "zero@a.nc" not in machine_of({"a.nc": plain}).parameters
+    assert machine.parameters["zero@a.nc"].sd == 2e-3
+    told = {}
+    for block in machine.blocks(at, "a.nc"):
+        if "zero@a.nc" in block.columns:
+            x, left = whiten(block.bands, block.usable, np.array([block.columns["zero@a.nc"], block.residual]).T).T
+            told[block.equation] = -x @ left / (x @ x), 1.0 / np.sqrt(x @ x)
+    assert {"electrical_a", "commutation"} <= told.keys()
+    for equation in ("electrical_a", "electrical_b", "electrical_c", "commutation"):
+        found, error = told[equation]
+        assert found == pytest.approx(off, abs=4.0 * error + 2e-4) and error < 0.3 * off, (equation, found, error)
+
+
 def test_every_effect_has_a_size_here():
     assert set(SIZES) == set(EFFECTS) - {"speed_quantisation"}
 
@@ -244,6 +263,7 @@ def test_what_moves_a_residual_has_a_column(command, ends):
     recording = recorded(command, fault=FAULT, health="seeded")
     if not ends:
         recording = replace(recording, phase_current_end=None)
+    recording = replace(recording, known={"rotor_angle": {"zero_error": 2e-3}})
     machine = machine_of({"a.nc": recording})
     at = {n: v for n, v in truth(machine, recording, fault=FAULT).items() if n in machine.parameters}
     base = {b.equation: b for b in machine.blocks(at, "a.nc")}

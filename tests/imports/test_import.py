@@ -52,6 +52,7 @@ def test_any_format_through_the_command(file, tmp_path, fine, truth, capsys):
     printed = capsys.readouterr().out
     assert "electrical zero: 57.3 degrees" in printed and "one.nc and import.html" in printed
     recording = read_recording(tmp_path / "bench" / "one.nc")
+    assert 0.0 < recording.known["rotor_angle"]["zero_error"] < np.deg2rad(0.5)
     assert off(recording, truth) == []
     assert read_bench(tmp_path / "bench", ACTUATOR).recordings.keys() == {"one.nc"}
     assert json.loads(recording.attributes["import_map"])["unit"] == "unit 7" == recording.attributes["unit"]

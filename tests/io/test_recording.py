@@ -50,6 +50,10 @@ BROKEN = {
         "rotor_speed has noise 'small'",
     ),
     "no noise": (lambda r: replace(r, known={"rotor_speed": {"noise": 0.0}}), "accepted is a positive number"),
+    "a zero without error": (
+        lambda r: replace(r, known={"rotor_angle": {"zero_error": -0.1}}),
+        "rotor_angle has zero_error '-0.1', accepted is a positive number in electrical rad",
+    ),
     "unknown health": (lambda r: replace(r, attributes={"health": "fine"}), "health is 'fine'"),
 }
 

@@ -97,7 +97,7 @@ def _edges(state: State, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Du
     # (Berkson's error: Fuller 1987, Measurement Error Models, section 1.6.4)
     angle = rec.drawn_from
     low, high = angle.once(("ends", j), lambda: tuple(x[rows] for x in sweep(angle, j)[:2]))
-    early: Dual | float = p(f"controller.edge_{'abc'[j]}")
+    early = p(f"controller.edge_{'abc'[j]}") - p.own("zero")
     for m in with_hook("commutation"):
         early = early + m.commutation(p.of(effect_name(m)), j)
     stays = np.abs(np.asarray(state.current[STAYS[j]].value)[rows])

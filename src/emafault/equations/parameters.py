@@ -70,6 +70,8 @@ def nuisances(
             full = f"skew.{channel}@{name}"
             out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
         out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO / a.gear_ratio, "rad")
+        if rec.zero_error > 0.0:
+            out[f"zero@{name}"] = Parameter(f"zero@{name}", 0.0, 0.0, rec.zero_error, "rad")
         full = f"controller.timing@{name}"
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
         if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again

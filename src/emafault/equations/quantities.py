@@ -44,7 +44,7 @@ def _sum(state: State, hook: str, *args):
 def _angles(state: State) -> None:
     """Mean of f over each interval, swept and over its conducting part; both with derivatives by offset and ramp."""
     rec = state.rec
-    shift, ramp = _sum(state, "angle"), _sum(state, "ramp")
+    shift, ramp = _sum(state, "angle") + state.p.own("zero"), _sum(state, "ramp")
     poles = rec.actuator.pole_pairs
     state.swept, state.regressor, state.conducting = [], [], []
     per = 1.0 / (poles * rec.interval)
@@ -101,7 +101,7 @@ def _conducting_shape(state: State, j: int, low, high, shift, ramp) -> Dual:
 
 def _early(state: State, j: int) -> float:
     """Electrical rad by which the commutations that switch phase j on come early."""
-    return float(value_of(_sum(state, "commutation", j)))
+    return float(value_of(_sum(state, "commutation", j) - state.p.own("zero")))
 
 
 def _coefficients(state: State) -> None:

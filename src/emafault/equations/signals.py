@@ -41,6 +41,7 @@ class Signals:
     health: str
     noise: SensorNoise
     lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it
+    zero_error: float = 0.0  # electrical rad, standard error of the angle's zero, where it was fitted to the voltages
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
@@ -56,7 +57,7 @@ class Signals:
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
-            noise, lost,
+            noise, lost, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
         )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -42,6 +42,8 @@ def recording_of(
     ends = _ends(raw, three, edges)
     angle = raw.single["rotor_angle"].at(edges)
     known: dict[str, dict[str, Any]] = {"rotor_angle": {"source": _source(given)}}
+    if raw.zero_error > 0.0:
+        known["rotor_angle"]["zero_error"] = raw.zero_error
     voltage = known["phase_voltage"] = {"reference": "star"}
     star = given["signals"]["phase_voltage"]["reference"]
     phase_voltage = means["phase_voltage"]

@@ -26,6 +26,7 @@ class Raw:
     phased: dict[str, list[Signal | None]]
     lost: list[str] = field(default_factory=list)  # what cannot be told without what was not measured
     off: np.ndarray | None = None  # (sample, 3) bool, of duties: a leg that is off
+    zero_error: float = 0.0  # standard error of the angle's zero (electrical rad), where the voltages gave it
 
     def signals(self) -> list[Signal]:
         """All that there are."""

@@ -132,6 +132,7 @@ def _set_zero(raw: Raw, given: Mapping[str, Any], fitted: Electrical, pole_pairs
                 "take it out, or put it right"
             )
     else:
+        raw.zero_error = fitted.error
         raw.lost.append(
             "the angle's electrical zero is that of the voltages: a displaced angle sensor cannot be detected"
         )

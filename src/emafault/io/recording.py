@@ -30,7 +30,7 @@ VARIABLES: dict[str, tuple[bool, str, bool, str]] = {
 }
 MINIMUM_DURATION = 0.2  # s
 #: variable -> attributes that a recording may have which was not born in the format, besides ``noise`` of any variable
-KNOWN = {"phase_voltage": ("reference",), "phase_current": ("derived",), "rotor_angle": ("source",)}
+KNOWN = {"phase_voltage": ("reference",), "phase_current": ("derived",), "rotor_angle": ("source", "zero_error")}
 REFERENCES = ("star", "modelled_star")  # of phase voltages that are read here
 MINIMUM_SAMPLES = 100  # 2 ms apart, in the least duration
 #: what no actuator has, by unit: larger values are of another unit or of none
@@ -225,9 +225,10 @@ def _known(variable) -> dict[str, Any]:
     """What a file says of a variable beyond the format: see ``KNOWN``."""
     said = variable.ncattrs()
     known = {k: variable.getncattr(k) for k in ("noise", *KNOWN.get(variable.name, ())) if k in said}
-    noise = known.get("noise", 1.0)
-    if not (isinstance(noise, int | float | np.number) and 0.0 < float(noise) < np.inf):
-        raise InputError(f"{variable.name} has noise '{noise}', accepted is a positive number in its unit")
+    for name, unit in (("noise", "its unit"), ("zero_error", "electrical rad")):
+        value = known.get(name, 1.0)
+        if not (isinstance(value, int | float | np.number) and 0.0 < float(value) < np.inf):
+            raise InputError(f"{variable.name} has {name} '{value}', accepted is a positive number in {unit}")
     return known
 
 
