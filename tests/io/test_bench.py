@@ -189,6 +189,14 @@ def test_a_controller_off_by_far_is_no_mistaken_command(shop, factors):
         refuse_mistaken(name, recording, shop.actuator)
 
 
+def test_a_command_beyond_the_end_stop_is_no_other_unit(shop):
+    """The output waits there while the command runs on, to thirty times as far."""
+    plan = ("parabolic", {"acceleration": 0.3}, 20.0, "healthy")
+    for name, recording in shop.make_bench({}, (plan,), duration=10.0).items():
+        assert np.ptp(recording.commanded_position) > 25.0 * np.ptp(recording.output_position)
+        refuse_mistaken(name, recording, shop.actuator)
+
+
 def test_a_ramp_in_degrees_is_told_from_one_too_fast(plain, shop):
     """The nominal actuator cannot follow either, but what it does at a quarter of its speed is no limit."""
     ramp = plain["recording_1.nc"]

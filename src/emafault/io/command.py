@@ -1,7 +1,7 @@
 """The command beside the output that follows it: which way it counts, and in which unit.
 
-A position controller turns the output towards the command, at its gain times the error (rad/s) and no faster than the
-actuator can. A replay of this alone, with the gain that suits best, tells a command that is reversed or in another
+A position controller turns the output towards the command, at its gain times the error (rad/s), no faster than the
+actuator can and no further than its end stops. A replay of this alone, with the gain that suits best, tells a command that is reversed or in another
 unit: what a bench's own gains, limits, lags and loads do to the way there is far less.
 """
 
@@ -71,11 +71,12 @@ def _misfits(recording: Recording, actuator: ActuatorParameters, factors: np.nda
     over = max(1, round(RATE_OVER / recording.interval))
     reached = np.abs(recording.output_position[over:] - recording.output_position[:-over]).max()
     fastest = max(reached / (over * recording.interval), FULL_SPEED * actuator.speed_limit / actuator.gear_ratio)
+    lowest, highest = min(-actuator.end_stop, output.min()), max(actuator.end_stop, output.max())
     gain = GAINS * actuator.position_gain
     position = np.full((len(factors), 2, len(gain)), output[0])
     left = np.zeros_like(position)
     for n, step in enumerate(np.diff(time), start=1):
         way = (target[..., n - 1, None] - position) * -np.expm1(-gain * step)
-        position += np.clip(way, -fastest * step, fastest * step)
+        position = np.clip(position + np.clip(way, -fastest * step, fastest * step), lowest, highest)
         left += (output[n] - position) ** 2
     return left.min(axis=(1, 2)) / max(float(np.sum((output - output[0]) ** 2)), 1e-30)
