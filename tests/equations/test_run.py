@@ -136,6 +136,23 @@ def test_a_diagnosis_is_tracked_and_a_tracker_that_fails_breaks_nothing(tmp_path
     assert "not tracked" in capsys.readouterr().err
 
 
+def test_of_a_large_bench_a_part_is_taken_and_said(tmp_path, capsys):
+    for n in range(7):
+        write_recording(tmp_path / "large" / f"{n}.nc", recorded(("sine", "reversal")[n % 2], seed=n))
+    few = ["diagnose", str(tmp_path / "large"), "--samples", "5000", "--no-tracking"]
+    assert main([*few, "--out", str(tmp_path / "out")]) == 0
+    verdict = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    taken = verdict["recordings"]["explore"] + verdict["recordings"]["confirm"]
+    assert len(taken) == 5 and {f"{n}.nc" for n in range(7)} > set(taken)
+    (told,) = (w["message"] for w in verdict["warnings"] if w["kind"] == "samples")
+    printed = capsys.readouterr().out
+    assert told.startswith("5 of 7 recordings are taken, 0 of them in part") and told in printed.splitlines()[1:]
+    assert f"<li>{told}.</li>" in (tmp_path / "out" / "report.html").read_text()
+    assert main([*few, "--corrected", str(tmp_path / "new")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("emafault diagnose: --corrected: 5 of 7 recordings") and not (tmp_path / "new").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -11,6 +11,7 @@ from ..equations.diagnose import Diagnosed
 from ..equations.sentences import finding
 from ..errors import InputError, shown
 from ..io.bench import Bench, check_bench
+from ..io.enough import SAMPLES, within
 from ..io.recording import Recording
 from ..reporting.written import REPORT, checked, refuse_foreign
 from .actuator import Actuator
@@ -96,6 +97,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     twin: None = None,
     calibration: str | Path | None = None,
+    samples: int = SAMPLES,
 ) -> Diagnosis: ...
 @overload
 def diagnose(
@@ -111,6 +113,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     twin: str | Path | None = None,
     calibration: str | Path | None = None,
+    samples: int = SAMPLES,
 ) -> Diagnosis | MachineDiagnoses:
     """Diagnose recordings of one actuator, or of a measured machine, as ``emafault diagnose`` does.
 
@@ -121,6 +124,7 @@ def diagnose(
     exclude : effects of the catalogue to leave out
     twin : name of the measured machine that they come from, or a Python file that states one
     calibration : ``calibration.json`` of the actuator, which ``snakemake calibration`` writes
+    samples : of the recordings that are taken at most: a diagnosis takes the longer, the more
 
     Raises
     ------
@@ -136,5 +140,5 @@ def diagnose(
         return diagnose_machine(recordings, twin, exclude)
     given = recordings_of(recordings)
     actuator = actuator or Actuator.reference()
-    bench = check_bench(given.name, dict(given), actuator.parameters)
+    bench = within(check_bench(given.name, dict(given), actuator.parameters), samples)
     return Diagnosis(run.diagnose_bench(bench, actuator.spec, exclude, calibration), bench)

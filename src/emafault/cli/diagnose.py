@@ -35,6 +35,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--calibration", metavar="FILE", help="calibration.json of the actuator, which snakemake calibration writes"
     )
+    parser.add_argument(
+        "--samples",
+        type=int,
+        metavar="N",
+        help="most samples that are taken of a bench, spread over conditions (100000)",
+    )
     parser.add_argument("--force", action="store_true", help="replace files that are not of this bench's diagnosis")
     parser.add_argument("--no-tracking", action="store_true", help="log no MLflow run")
 
@@ -49,6 +55,7 @@ def run(args: argparse.Namespace) -> None:
     from .. import config
     from ..checks import LONGEST_NAME
     from ..errors import InputError, shown
+    from ..io.enough import SAMPLES
     from ..reporting.written import refuse_experiment
 
     actuator = args.twin == "actuator"
@@ -66,13 +73,15 @@ def run(args: argparse.Namespace) -> None:
     if actuator:
         from ..equations.run import diagnose_folder
 
-        more = args.corrected, args.force, args.calibration
+        more = args.corrected, args.force, args.calibration, SAMPLES if args.samples is None else args.samples
         diagnose_folder(args.path, spec, args.out, args.exclude, target, tracking, *more)
         if args.corrected:
             print(identified(args.path, args.corrected, args.actuator))
     else:
         if args.corrected:
             raise InputError("--corrected: only recordings of the actuator can be corrected")
+        if args.samples is not None:
+            raise InputError("--samples: only of recordings of the actuator, accepted without --twin")
         if args.calibration:
             raise InputError("--calibration: only probabilities of an actuator are checked, accepted without --twin")
         if target is not None:

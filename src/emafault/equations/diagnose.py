@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis import wandering
@@ -18,6 +16,7 @@ from ..diagnosis.search import Model
 from ..effects import EFFECTS
 from ..effects.scaling import scaled
 from ..errors import InputError
+from ..io.enough import FEWEST, spread
 from ..io.recording import Recording
 from .held_out import Explored, held_to_account
 from .machine import ReferenceActuator
@@ -27,7 +26,6 @@ from .signals import Signals, estimated_noise
 from .verdict import Fitted, verdict_of
 
 ENOUGH = 50_000  # samples that a search begins with; what it leads to is fitted to all
-FEWEST = 5  # recordings that it begins with
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,8 @@ def diagnose(
     library = exclude, scaled(actuator, tolerances)
     machine = ReferenceActuator(actuator, {n: Signals.of(n, recordings[n], actuator, own) for n in explore}, *library)
     bench = Bench(machine, list(explore), processes)
-    first = _spread(recordings, explore)
+    enough = int(len(explore) * ENOUGH / sum(len(recordings[n].time) for n in explore))
+    first = spread(recordings, explore, min(len(explore), max(FEWEST, enough)))
     if len(first) < len(explore):
         begun = Bench(machine, first, processes)
         fit = bench.fit((begun, begun.fit()))
@@ -130,20 +129,6 @@ def diagnose(
     final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders)
     fitted = Fitted(whole, every, all_fit, final, held_out)
     return Diagnosed.of(fitted, verdict_of(name, split, fitted, sealed, recordings, quality), own)
-
-
-def _spread(recordings: Mapping[str, Recording], names: Sequence[str]) -> list[str]:
-    """As many of the recordings as a search needs to begin with, spread over temperatures, commands and health."""
-    order = sorted(
-        names,
-        key=lambda n: (
-            recordings[n].ambient_temperature, recordings[n].attributes.get("health"),
-            str(recordings[n].attributes.get("command")), n,
-        ),
-    )  # fmt: skip
-    samples = sum(len(recordings[n].time) for n in names)
-    count = min(len(order), max(FEWEST, int(len(order) * ENOUGH / samples)))
-    return sorted({order[k] for k in np.linspace(0, len(order) - 1, count).round().astype(int)})
 
 
 def _seal(reading: Reading) -> dict[str, Any]:

@@ -204,14 +204,20 @@ def ranked(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _cannot_tell(verdict: Mapping[str, Any]) -> list[str]:
-    """What is left open: groups, and listed effects neither named nor ruled out."""
+    """What is left open: groups, listed effects neither named nor ruled out, and what the recordings cannot tell."""
     out = [f"{' or '.join(g).replace('_', ' ')}: one of them acts" for g in verdict["groups"]]
     grouped = {e for g in verdict["groups"] for e in g}
     named = set(verdict["which"][0]["effects"])
     for effect, p in sorted(verdict["inclusion"].items(), key=lambda x: -x[1]):
         if OPEN < p < 0.9 and effect not in grouped | named:
             out.append(f"{effect.replace('_', ' ')} has a posterior probability of {p:.2g}")
-    return out or ["No listed effect is left between named and ruled out."]
+    out = out or ["No listed effect is left between named and ruled out."]
+    return [*out, *(_capital(w["message"], w["file"]) for w in verdict["warnings"])]
+
+
+def _capital(message: str, file: str | None) -> str:
+    """A message as a sentence, which begins with a file's name as that is."""
+    return f"{message}." if file else f"{message[0].upper()}{message[1:]}."
 
 
 def fault_vectors(verdict: Mapping[str, Any], truths: Mapping[str, Any]) -> list[dict[str, Any]]:

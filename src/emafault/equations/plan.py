@@ -14,7 +14,7 @@ from ..io.bench import bench_name
 from ..paths import results_folder
 from ..places import file_name, refuse_folder, refuse_irregular
 from ..plain import read_json
-from .run import diagnosed
+from .run import diagnosed, read_within
 from .sentences import separated
 
 HEADER = "time_s,position_rad"
@@ -76,7 +76,7 @@ def write_motions(entries: Sequence[Mapping[str, Any]], folder: str | Path, forc
 
 
 def _diagnosed(path: str | Path, spec: Mapping[str, Any]) -> dict[str, Any]:
-    _, found = diagnosed(path, spec)
+    found = diagnosed(read_within(path, spec), spec)
     return found.verdict | {"next_experiment": found.next_experiments()}
 
 

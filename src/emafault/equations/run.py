@@ -8,8 +8,10 @@ from typing import Any
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.forked import beside
+from ..errors import InputError
 from ..io.atomic import write_text
 from ..io.bench import Bench, bench_name, new_folder, read_bench
+from ..io.enough import SAMPLES, within
 from ..io.split import split_bench
 from ..paths import CONF, results_folder
 from ..places import file_name
@@ -36,6 +38,7 @@ def diagnose_folder(
     corrected: str | Path | None = None,
     force: bool = True,
     calibration: str | Path | None = None,
+    samples: int = SAMPLES,
 ) -> dict:
     """Diagnose a folder of recordings; write ``diagnosis.json``, ``report.html`` and ``experiment.yaml``.
 
@@ -49,6 +52,7 @@ def diagnose_folder(
     track : whether to log an MLflow run; one that fails is said so and breaks nothing
     force : whether files in ``out`` that are not of a diagnosis of this bench may be replaced
     calibration : check of the probabilities on this actuator, see ``probabilities``
+    samples : of a bench that are taken at most, see ``io.enough``
 
     Raises
     ------
@@ -59,7 +63,10 @@ def diagnose_folder(
     refuse_foreign(folder, [name], ["actuator"], force)  # before the work, not after it
     if corrected is not None:
         new_folder(path, corrected, "--corrected")
-    bench, found = diagnosed(path, spec, exclude, calibration)
+    bench = read_within(path, spec, samples)
+    if corrected is not None and (message := _left_out(bench)):
+        raise InputError(f"--corrected: {message[0]}, accepted is as many as there are")
+    found = diagnosed(bench, spec, exclude, calibration)
     verdict = found.verdict
     with aside(track) as tracked:
         write(found, bench, folder, experiment)
@@ -71,19 +78,33 @@ def diagnose_folder(
     return verdict
 
 
+def read_within(path: str | Path, spec: Mapping[str, Any], samples: int = SAMPLES) -> Bench:
+    """A folder of recordings read and checked, of which no more samples are taken.
+
+    Raises
+    ------
+    InputError : recordings that cannot be used
+    """
+    return within(read_bench(path, ActuatorParameters(**spec["actuator"])), samples)
+
+
 def diagnosed(
-    path: str | Path, spec: Mapping[str, Any], exclude: Sequence[str] = (), calibration: str | Path | None = None
-) -> tuple[Bench, Diagnosed]:
-    """A folder of recordings read and diagnosed, what was found printed.
+    bench: Bench, spec: Mapping[str, Any], exclude: Sequence[str] = (), calibration: str | Path | None = None
+) -> Diagnosed:
+    """A bench diagnosed, what was found printed.
 
     Raises
     ------
     InputError : recordings or effects that cannot be used
     """
-    bench = read_bench(path, ActuatorParameters(**spec["actuator"]))
     found = diagnose_bench(bench, spec, exclude, calibration)
-    print("\n".join(finding(found.verdict)), flush=True)
-    return bench, found
+    print("\n".join([*finding(found.verdict), *_left_out(bench, "set aside"), *_left_out(bench)]), flush=True)
+    return found
+
+
+def _left_out(bench: Bench, kind: str = "samples") -> list[str]:
+    """What of a bench a diagnosis does not take, for there are enough or, ``set aside``, for it is of no use."""
+    return [w["message"] for w in bench.warnings if w["kind"] == kind]
 
 
 def diagnose_bench(

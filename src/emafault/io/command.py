@@ -1,8 +1,8 @@
 """The command beside the output that follows it: which way it counts, and in which unit.
 
 A position controller turns the output towards the command, at its gain times the error (rad/s), no faster than the
-actuator can and no further than its end stops. A replay of this alone, with the gain that suits best, tells a command that is reversed or in another
-unit: what a bench's own gains, limits, lags and loads do to the way there is far less.
+actuator can and no further than its end stops. A replay of this alone, with the gain that suits best, tells a command
+that is reversed or in another unit: what a bench's own gains, limits, lags and loads do to the way there is far less.
 """
 
 import numpy as np

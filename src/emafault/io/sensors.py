@@ -322,16 +322,19 @@ def _motion(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
 
 def _at_extreme(values: np.ndarray, extreme: Callable) -> tuple[float, int, float]:
     """Extreme value, how often it occurs, and how often the three values next to it do on average."""
-    distinct, counts = np.unique(values, return_counts=True)
-    if extreme is np.max:
-        distinct, counts = distinct[::-1], counts[::-1]
-    return float(distinct[0]), int(counts[0]), float(np.mean(counts[1:4])) if len(counts) > 1 else float(counts[0])
+    levels: list[float] = []
+    counts: list[int] = []
+    rest = values
+    while len(rest) and len(levels) < 4:
+        levels.append(float(extreme(rest)))
+        others = rest[rest != levels[-1]]
+        counts.append(len(rest) - len(others))
+        rest = others
+    return levels[0], counts[0], float(np.mean(counts[1:])) if len(counts) > 1 else float(counts[0])
 
 
 def _longest_constant(values: np.ndarray, where: np.ndarray) -> int:
     """Longest run of samples that are exactly equal to the one before, where ``where`` holds."""
-    run = best = 0
-    for same in (np.diff(values) == 0.0) & where[1:]:
-        run = run + 1 if same else 0
-        best = max(best, run)
-    return best
+    same = (np.diff(values) == 0.0) & where[1:]
+    ends = np.flatnonzero(~np.concatenate([[False], same, [False]]))  # each run of the same lies between two of these
+    return int(np.diff(ends).max()) - 1
