@@ -1,5 +1,7 @@
 """Recordings simulated with known parameters, and the point at which their equations must hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,12 @@ def recorded(
         time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": health, "command": command},
         **{k: v[0] for k, v in out.items()},
     )  # fmt: skip
+
+
+def in_steps(recording, step):
+    """The same by a converter of currents in coarse steps (A)."""
+    rounded = {n: step * np.round(getattr(recording, n) / step) for n in ("phase_current", "phase_current_end")}
+    return replace(recording, **rounded)
 
 
 def machine_of(recordings, exclude=()):

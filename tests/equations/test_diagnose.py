@@ -12,7 +12,7 @@ from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
 from emafault.io.recording import read_recording
 
-from .conftest import ACTUATOR, NOISE, recorded
+from .conftest import ACTUATOR, NOISE, in_steps, recorded
 
 PLANS = (("parabolic", 30.0, 0.3), ("reversal", 30.0, 1.1), ("sine", -20.0, 2.0), ("parabolic", -20.0, 4.0))
 
@@ -67,6 +67,14 @@ def test_an_effect_is_named_with_its_size(cogging):
     assert a["low"] < 0.004 < a["high"]
     assert cogging["where"][0]["equation"] == "torque"
     assert cogging["shrinks"]["signal"]["closed"] > 0.9
+
+
+@pytest.mark.parametrize("effects", [{}, COGGING], ids=["none", "cogging"])
+def test_a_converter_s_coarse_steps_are_told_and_nothing_for_them(effects):
+    verdict = verdict_of({name: in_steps(r, 0.05) for name, r in bench(effects).items()})
+    assert [d["form"] for d in verdict["discovered"]] == ["adc_step"]
+    assert verdict["discovered"][0]["parameters"]["step"]["value"] == pytest.approx(0.05)
+    assert verdict["which"][0]["effects"] == list(effects)
 
 
 def test_the_seal_can_be_recomputed(cogging):

@@ -2,12 +2,14 @@
 
 from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
-from emafault.equations.signals import estimated_noise
+from emafault.equations.signals import STRETCH, Signals, estimated_noise
+from emafault.io.sensors import spikes
 
-from .conftest import NOISE, recorded
+from .conftest import ACTUATOR, NOISE, in_steps, recorded
 
 
 def test_stated_noise_is_taken_where_every_recording_states_it():
@@ -26,3 +28,31 @@ def test_the_currents_noise_is_found_whatever_their_offsets(offset):
     found = estimated_noise(recordings, SensorNoise(**{**asdict(NOISE), "current": 0.02, "current_end": 0.05}))
     assert found.current == pytest.approx(NOISE.current, rel=0.08)
     assert found.current_end == pytest.approx(NOISE.current_end, rel=0.08)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.05, 0.09])
+def test_coarse_steps_of_the_currents_are_noise_and_no_spikes(step):
+    """Most sums of three rounded currents are the same; where one is taken for a spike, the lattice is lost."""
+    recordings = [in_steps(recorded(command, seed=n), step) for n, command in enumerate(("sine", "reversal"))]
+    rounding = step / np.sqrt(12.0)
+    found = estimated_noise(recordings, NOISE).current
+    assert 0.999 * rounding < found < 1.05 * np.hypot(rounding, NOISE.current)
+    for recording in recordings:
+        assert len(spikes(recording.phase_current)) == 0
+        assert Signals.of("a.nc", recording, ACTUATOR, NOISE).current_step == pytest.approx(step)
+
+
+def test_over_a_stretch_of_a_slow_current_in_steps_the_error_is_one():
+    step = 0.05
+    plain = recorded("parabolic")
+    fine, coarse = (Signals.of("a.nc", r, ACTUATOR, NOISE) for r in (plain, in_steps(plain, step)))
+    assert fine.stretches() == []
+    found = coarse.stretches()
+    assert found and all(s.stop - s.start >= STRETCH for s in found)
+    assert all(one.stop <= other.start for one, other in zip(found, found[1:]))
+    error = coarse.level - fine.level
+    assert all(np.ptp(coarse.level[s]) < 1.5 * step for s in found)
+    of_stretches = np.array([error[s].mean() for s in found])
+    longest = max(found, key=lambda s: s.stop - s.start)
+    # white noise of so many samples would be far less
+    assert np.abs(of_stretches).max() > 5.0 * step / np.sqrt(12.0 * (longest.stop - longest.start))

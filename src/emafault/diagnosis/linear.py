@@ -303,10 +303,11 @@ def weights_from(
         raw += deviations.get(n, 0.0) * column
     left = _white(block, raw)
     scale = np.median(np.abs(left[usable])) / 0.6745
-    out = usable & (np.abs(left) > OUTLIER * max(scale, 1e-12))
+    out = usable & (np.abs(left) > OUTLIER * max(scale, 1.0 if block.rounded else 1e-12))
     keep = usable & ~(out | np.roll(out, 1))
     if keep.sum() < 0.5 * usable.sum():
         keep = usable
     if keep.sum() < FEW:  # no spectrum: the noise as stated, or more
         return Weights(keep, np.zeros(0), np.full(len(keep), max(float(np.mean(left[keep] ** 2)), 1.0)))
-    return coloured(np.where(keep, left, 0.0), keep, leads)
+    found = coloured(np.where(keep, left, 0.0), keep, leads)
+    return replace(found, wandering=()) if block.rounded else found

@@ -72,7 +72,8 @@ class Block:
 
     ``residual`` (row,), ``columns`` parameter -> scalar or (row,), ``bands`` diagonals of the noise's covariance
     (main first), ``usable`` (row,) bool, ``coordinates`` name -> (row,), with ``phi`` (function, row) and ``drivers``
-    (driver, row) for remainders.
+    (driver, row) for remainders. ``rounded``: a converter's steps are a part of the noise, so that most rows may leave
+    nothing, and what slow signals leave wanders.
     """
 
     recording: str
@@ -82,6 +83,7 @@ class Block:
     bands: list[np.ndarray]
     usable: np.ndarray
     coordinates: dict = field(default_factory=dict)
+    rounded: bool = False
 
     @cached_property
     def factor(self) -> np.ndarray:

@@ -91,10 +91,27 @@ def gain(p: Point, j: int) -> Dual:
     return out
 
 
+def _rounding(rec: Signals, p: Point) -> Dual | None:
+    """What a converter's coarse steps add to the size of a current that changes slowly (A), (sample,): the same in
+    both directions. What they add to others is noise."""
+    where = rec.rows_from.once(("stretches",), rec.rows_from.stretches)
+    if not where:
+        return None
+    value, slopes = np.zeros(rec.size), {}
+    for k, there in enumerate(where):
+        off = p(f"rounded.{k}@{rec.name}")
+        value[there] = off.value
+        for n in off.slopes:
+            slopes[n] = np.zeros(rec.size)
+            slopes[n][there] = 1.0
+    return Dual(value, slopes)
+
+
 def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
     and gain."""
     share = rec.time / rec.time[-1]
+    rounding = _rounding(rec, p)
     means: list[Dual] = []
     ends: list[Dual] = []
     at_end = rec.current_end
@@ -106,7 +123,9 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
             i = undone(p, "current", source[:, j], rec.size)
             drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
             i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
-            i = i - drift * share - p(f"rounded.{'abc'[j]}@{rec.name}")
+            i = i - drift * share
+            if out is means and rounding is not None:
+                i = i - rounding * rec.rows_from.once(("sign", j), lambda j=j: np.sign(rec.rows_from.current[:, j]))
             for q in range(3):
                 if q != j:
                     i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]

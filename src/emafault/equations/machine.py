@@ -219,7 +219,8 @@ class ReferenceActuator:
     def _block(self, state: State, name: str, r: Dual, bands: list[np.ndarray], usable: np.ndarray) -> Block:
         columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
         along = self._coordinates(state, name)
-        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along)
+        rounded = state.rec.current_step > 0.0
+        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded)
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""

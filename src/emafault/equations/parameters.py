@@ -74,10 +74,9 @@ def nuisances(
             out[f"zero@{name}"] = Parameter(f"zero@{name}", 0.0, 0.0, rec.zero_error, "rad")
         full = f"controller.timing@{name}"
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
-        if rec.current_step > 0.0:  # of slow currents a converter's steps are off by the same again and again
-            for j in PER_PHASE:
-                full = f"rounded.{j}@{name}"
-                out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
+        for k in range(len(rec.stretches())):
+            full = f"rounded.{k}@{name}"
+            out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
         for full in (n for j in range(3) for n in commutation.passing(j, name)):
             out[full] = Parameter(full, 0.0, 0.0, commutation.ripple_time(a), "s")
         if rec.health == "seeded":

@@ -19,6 +19,8 @@ UNRESOLVED = 0.2  # of the change from interval to interval: where within one a 
 SLOW = 2.0  # rad/s, below which dry friction has no known sign
 STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands still does not change
 AVERAGED_AT_REST = 2e-2  # s
+STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
+STRETCHES = 60  # in a recording
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
 
@@ -54,11 +56,13 @@ class Signals:
             spiked = np.zeros(len(r.time), bool)
             spiked[rows] = True
             lost |= binary_dilation(spiked)
-        return cls(
+        out = cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
         )  # fmt: skip
+        out.current_step = max(lattice_step(x) for x in r.phase_current.T)  # spikes were taken off the lattice
+        return out
 
     def __post_init__(self) -> None:
         theta, h = self.angle, self.interval
@@ -128,6 +132,21 @@ class Signals:
             self._once[key] = compute()
         return self._once[key]
 
+    def stretches(self) -> list[slice]:
+        """The longest stretches in which a current in coarse steps is nowhere a step from where it is elsewhere: over
+        each the error of rounding is much the same."""
+        if self.current_step == 0.0:
+            return []
+        found, first, low, high = [], 0, np.inf, -np.inf
+        for k, x in enumerate([*self.level.tolist(), np.inf]):
+            if max(high, x) - min(low, x) > 1.01 * self.current_step:
+                found.append(slice(first, k))
+                first, low, high = k, x, x
+            else:
+                low, high = min(low, x), max(high, x)
+        long = [s for s in found if s.stop - s.start >= STRETCH]
+        return sorted(sorted(long, key=lambda s: s.start - s.stop)[:STRETCHES], key=lambda s: s.start)
+
     def disturbed(self, seed: int) -> "Signals":
         """A copy with a draw of the sensors' noise added once more; what is masked and along what rows lie stays."""
         rng = np.random.default_rng(seed)
@@ -183,7 +202,8 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has.
+    each of them has; where a converter's steps are coarse, most differences of a current that changes slowly are none,
+    and its noise is that of rounding (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
 
     def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
@@ -199,20 +219,22 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     finest = min(r.interval for r in recordings)
     fine = [r for r in recordings if r.interval < 1.5 * finest]
     angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
+    step = max(lattice_step(x) for r in recordings for x in r.phase_current.T)
+    rounding = step / np.sqrt(12.0)
     current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
-    step = max(lattice_step(r.phase_current[:, 0]) for r in recordings)
     ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in recordings if r.phase_current_end is not None]
     output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
     speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
     limits = {
-        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(18.0), "position": output,
+        "angle": angle, "current": max(current, rounding), "current_end": robust(ends, step) / np.sqrt(18.0),
+        "position": output,
     }  # fmt: skip
     if lattice_step(fine[0].rotor_speed) == 0.0:
         limits["speed"] = speed
     return replace(
         nominal,
         **{
-            k: float(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k)))
+            k: float(np.clip(v, 0.2 * getattr(nominal, k), max(5.0 * getattr(nominal, k), rounding * (k == "current"))))
             for k, v in limits.items()
             if np.isfinite(v)
         }

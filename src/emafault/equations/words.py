@@ -103,7 +103,7 @@ def _of_group(group: str, short: str) -> str:
     channel, _, side = short.partition("_")
     chain = {
         "skew": f"{short} channel is sampled late by",
-        "rounded": f"rounding of the current of phase {short}",
+        "rounded": f"rounding of the current, stretch {short}",
         "lag": f"{'output position' if channel == 'output' else channel} channel comes {side} by",
         "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
