@@ -1,6 +1,7 @@
 """Noise of channels: estimated, or as recordings state it."""
 
 from dataclasses import asdict, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_over_a_stretch_of_a_slow_current_in_steps_the_error_is_one():
     assert fine.stretches() == []
     found = coarse.stretches()
     assert found and all(s.stop - s.start >= STRETCH for s in found)
-    assert all(one.stop <= other.start for one, other in zip(found, found[1:]))
+    assert all(one.stop <= other.start for one, other in pairwise(found))
     error = coarse.level - fine.level
     assert all(np.ptp(coarse.level[s]) < 1.5 * step for s in found)
     of_stretches = np.array([error[s].mean() for s in found])

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from .dual import Dual
+from .dual import Dual, Number
 from .point import Point, effect_name
 from .signals import Signals
 from .terms import with_hook
@@ -97,13 +97,15 @@ def _rounding(rec: Signals, p: Point) -> Dual | None:
     where = rec.rows_from.once(("stretches",), rec.rows_from.stretches)
     if not where:
         return None
-    value, slopes = np.zeros(rec.size), {}
+    value = np.zeros(rec.size)
+    slopes: dict[str, Number] = {}
     for k, there in enumerate(where):
         off = p(f"rounded.{k}@{rec.name}")
         value[there] = off.value
         for n in off.slopes:
-            slopes[n] = np.zeros(rec.size)
-            slopes[n][there] = 1.0
+            column = np.zeros(rec.size)
+            column[there] = 1.0
+            slopes[n] = column
     return Dual(value, slopes)
 
 
@@ -125,7 +127,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
             i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
             i = i - drift * share
             if out is means and rounding is not None:
-                i = i - rounding * rec.rows_from.once(("sign", j), lambda j=j: np.sign(rec.rows_from.current[:, j]))
+                i = i - rounding * np.sign(rec.rows_from.current[:, j])
             for q in range(3):
                 if q != j:
                     i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]
