@@ -48,10 +48,9 @@ def recorded(
     )  # fmt: skip
 
 
-def in_steps(recording, step):
-    """The same by a converter of currents in coarse steps (A)."""
-    rounded = {n: step * np.round(getattr(recording, n) / step) for n in ("phase_current", "phase_current_end")}
-    return replace(recording, **rounded)
+def in_steps(recording, steps):
+    """The same where channels come in coarse steps, by variable."""
+    return replace(recording, **{n: step * np.round(getattr(recording, n) / step) for n, step in steps.items()})
 
 
 def machine_of(recordings, exclude=()):

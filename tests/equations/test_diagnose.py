@@ -69,12 +69,22 @@ def test_an_effect_is_named_with_its_size(cogging):
     assert cogging["shrinks"]["signal"]["closed"] > 0.9
 
 
-@pytest.mark.parametrize("effects", [{}, COGGING], ids=["none", "cogging"])
-def test_a_converter_s_coarse_steps_are_told_and_nothing_for_them(effects):
-    verdict = verdict_of({name: in_steps(r, 0.05) for name, r in bench(effects).items()})
-    assert [d["form"] for d in verdict["discovered"]] == ["adc_step"]
-    assert verdict["discovered"][0]["parameters"]["step"]["value"] == pytest.approx(0.05)
+COARSE = {
+    "currents": ({"phase_current": 0.05, "phase_current_end": 0.05}, {}, "sensor_current"),
+    "currents beside an effect": ({"phase_current": 0.05, "phase_current_end": 0.05}, COGGING, "sensor_current"),
+    "output beside an effect": ({"output_position": 1e-4}, COGGING, "position"),
+    "encoder of 4096 counts beside an effect": ({"rotor_angle": 2.0 * np.pi / 4096.0}, COGGING, None),
+}
+
+
+@pytest.mark.parametrize("case", COARSE)
+def test_coarse_steps_are_told_and_nothing_for_them(case):
+    steps, effects, equation = COARSE[case]
+    verdict = verdict_of({name: in_steps(r, steps) for name, r in bench(effects).items()})
+    assert [(d["form"], d["equation"]) for d in verdict["discovered"]] == ([("adc_step", equation)] if equation else [])
     assert verdict["which"][0]["effects"] == list(effects)
+    for d in verdict["discovered"]:
+        assert d["parameters"]["step"]["value"] == pytest.approx(next(iter(steps.values())))
 
 
 def test_the_seal_can_be_recomputed(cogging):

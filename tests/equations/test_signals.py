@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
-from emafault.equations.signals import STRETCH, Signals, estimated_noise
+from emafault.equations.signals import STRETCH, Signals, estimated_noise, spacing
 from emafault.io.sensors import spikes
 
-from .conftest import ACTUATOR, NOISE, in_steps, recorded
+from .conftest import ACTUATOR, NOISE, in_steps, machine_of, recorded
 
 
 def test_stated_noise_is_taken_where_every_recording_states_it():
@@ -34,7 +34,7 @@ def test_the_currents_noise_is_found_whatever_their_offsets(offset):
 @pytest.mark.parametrize("step", [0.02, 0.05, 0.09])
 def test_coarse_steps_of_the_currents_are_noise_and_no_spikes(step):
     """Most sums of three rounded currents are the same; where one is taken for a spike, the lattice is lost."""
-    recordings = [in_steps(recorded(command, seed=n), step) for n, command in enumerate(("sine", "reversal"))]
+    recordings = [in_steps(recorded(c, seed=n), {"phase_current": step}) for n, c in enumerate(("sine", "reversal"))]
     rounding = step / np.sqrt(12.0)
     found = estimated_noise(recordings, NOISE).current
     assert 0.999 * rounding < found < 1.05 * np.hypot(rounding, NOISE.current)
@@ -46,7 +46,7 @@ def test_coarse_steps_of_the_currents_are_noise_and_no_spikes(step):
 def test_over_a_stretch_of_a_slow_current_in_steps_the_error_is_one():
     step = 0.05
     plain = recorded("parabolic")
-    fine, coarse = (Signals.of("a.nc", r, ACTUATOR, NOISE) for r in (plain, in_steps(plain, step)))
+    fine, coarse = (Signals.of("a.nc", r, ACTUATOR, NOISE) for r in (plain, in_steps(plain, {"phase_current": step})))
     assert fine.stretches() == []
     found = coarse.stretches()
     assert found and all(s.stop - s.start >= STRETCH for s in found)
@@ -57,3 +57,27 @@ def test_over_a_stretch_of_a_slow_current_in_steps_the_error_is_one():
     longest = max(found, key=lambda s: s.stop - s.start)
     # white noise of so many samples would be far less
     assert np.abs(of_stretches).max() > 5.0 * step / np.sqrt(12.0 * (longest.stop - longest.start))
+
+
+def test_an_encoder_s_counts_are_noise_of_rounding_however_evenly_it_turns():
+    counts = 2.0 * np.pi / 4096.0
+    turning = [in_steps(recorded(c, seed=n), {"rotor_angle": counts}) for n, c in enumerate(("reversal", "parabolic"))]
+    assert estimated_noise(turning, NOISE).angle == pytest.approx(counts / np.sqrt(12.0), rel=0.2)
+    evenly = replace(turning[0], rotor_angle=counts * np.round(np.arange(4000) * 20.5))
+    assert estimated_noise([evenly], NOISE).angle == pytest.approx(counts / np.sqrt(12.0))
+    assert spacing(turning[0].rotor_angle) == pytest.approx(counts) and spacing(recorded().rotor_angle) == 0.0
+
+
+def test_of_an_output_in_counts_the_rounding_goes_with_its_place():
+    counts = 1e-4
+    recording = in_steps(recorded("parabolic"), {"output_position": counts})
+    machine = machine_of({"a.nc": recording})
+    (block,) = (
+        b for b in machine.blocks({n: p.off for n, p in machine.parameters.items()}, "a.nc") if b.equation == "position"
+    )
+    names = [n for n in block.columns if n.startswith("counts.")]
+    columns = np.array([block.columns[n] for n in names]).T[block.usable]
+    left = block.residual[block.usable]
+    fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+    assert len(names) == 6 and counts**2 / 12.0 < np.var(left) < counts**2 / 8.0
+    assert np.var(left - fitted) < 0.7 * np.var(left)

@@ -219,7 +219,7 @@ class ReferenceActuator:
     def _block(self, state: State, name: str, r: Dual, bands: list[np.ndarray], usable: np.ndarray) -> Block:
         columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
         along = self._coordinates(state, name)
-        rounded = state.rec.current_step > 0.0
+        rounded = (state.rec.output_step if name == "position" else state.rec.current_step) > 0.0
         return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded)
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import TOLERANCES, Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
-from . import commutation
+from . import commutation, position
 from .point import SEEDED
 from .signals import REST, Signals
 from .terms import TERMS
@@ -69,11 +69,14 @@ def nuisances(
         for channel in ("voltage", "current"):
             full = f"skew.{channel}@{name}"
             out[full] = Parameter(full, 0.0, 0.0, SKEW / rec.interval, "interval")
-        out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, ZERO / a.gear_ratio, "rad")
+        zero = np.hypot(ZERO / a.gear_ratio, 0.5 * rec.output_step)  # counts may be cut off or rounded
+        out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, zero, "rad")
         if rec.zero_error > 0.0:
             out[f"zero@{name}"] = Parameter(f"zero@{name}", 0.0, 0.0, rec.zero_error, "rad")
         full = f"controller.timing@{name}"
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
+        for full, k, _ in position.rounding_names(name) if rec.output_step > 0.0 else ():
+            out[full] = Parameter(full, 0.0, 0.0, rec.output_step / (np.sqrt(2.0) * np.pi * k), "rad")
         for k in range(len(rec.stretches())):
             full = f"rounded.{k}@{name}"
             out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")

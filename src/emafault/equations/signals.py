@@ -21,6 +21,8 @@ STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands 
 AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
 STRETCHES = 60  # in a recording
+ON = 2e-3  # of a step, that values may lie beside a lattice by
+SMALLEST = 1e-8  # step of a lattice, of the range of its values
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
 
@@ -97,6 +99,8 @@ class Signals:
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
         self.speed_step = lattice_step(self.speed_recorded)
         self.current_step = max(lattice_step(x) for x in self.current.T)
+        counts = spacing(self.output)
+        self.output_step = counts if counts > self.noise.position else 0.0
         self.dT_measured = self.ambient - self.actuator.reference_temperature
         self.solved: dict[tuple, Any] = {}
         self._once: dict[tuple, Any] = {}
@@ -182,7 +186,7 @@ class Signals:
     def _changed(self, **signals: Any) -> "Signals":
         """A copy with other signals; what is masked and along what rows lie stays."""
         out = replace(self, **signals)
-        out.speed_step, out.current_step = self.speed_step, self.current_step
+        out.speed_step, out.current_step, out.output_step = self.speed_step, self.current_step, self.output_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self.rows_from
         return out
 
@@ -202,8 +206,8 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has; where a converter's steps are coarse, most differences of a current that changes slowly are none,
-    and its noise is that of rounding (Widrow and Kollar 2008, Quantization Noise, chapter 1).
+    each of them has. Where a channel comes in coarse steps most differences of what changes slowly, or evenly, are
+    none, and its noise is that of rounding at least (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
 
     def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
@@ -220,21 +224,23 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     fine = [r for r in recordings if r.interval < 1.5 * finest]
     angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
     step = max(lattice_step(x) for r in recordings for x in r.phase_current.T)
-    rounding = step / np.sqrt(12.0)
+    rounding = {
+        "current": step / np.sqrt(12.0), "angle": min(spacing(r.rotor_angle) for r in recordings) / np.sqrt(12.0),
+        "position": min(spacing(r.output_position) for r in recordings) / np.sqrt(12.0),
+    }  # fmt: skip
     current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
     ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in recordings if r.phase_current_end is not None]
     output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
     speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
     limits = {
-        "angle": angle, "current": max(current, rounding), "current_end": robust(ends, step) / np.sqrt(18.0),
-        "position": output,
+        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(18.0), "position": output,
     }  # fmt: skip
     if lattice_step(fine[0].rotor_speed) == 0.0:
         limits["speed"] = speed
     return replace(
         nominal,
         **{
-            k: float(np.clip(v, 0.2 * getattr(nominal, k), max(5.0 * getattr(nominal, k), rounding * (k == "current"))))
+            k: float(max(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k)), rounding.get(k, 0.0)))
             for k, v in limits.items()
             if np.isfinite(v)
         }
@@ -262,3 +268,19 @@ def lattice_step(x: np.ndarray) -> float:
     times = gaps / step
     on = np.abs(times - np.round(times)) < 1e-3 * np.maximum(times, 1.0)
     return step if step > 1e-9 * np.ptp(x) and on.mean() > 0.99 else 0.0
+
+
+def spacing(x: np.ndarray) -> float:
+    """Spacing of the lattice that all values of a channel lie on, however few of its places they fill, as an encoder's
+    counts; 0 of others. The greatest common divisor of the gaps between values, by Euclid's algorithm."""
+    gaps = np.diff(np.unique(x))
+    if len(gaps) < 2:
+        return 0.0
+    step = float(gaps.min())
+    while step > SMALLEST * gaps.sum():
+        rest = np.abs(gaps - step * np.round(gaps / step))
+        off = rest > ON * step
+        if np.mean(off) < 0.01:
+            return step
+        step = float(rest[off].min())
+    return 0.0

@@ -103,6 +103,7 @@ def _of_group(group: str, short: str) -> str:
     channel, _, side = short.partition("_")
     chain = {
         "skew": f"{short} channel is sampled late by",
+        "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
         "lag": f"{'output position' if channel == 'output' else channel} channel comes {side} by",
         "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
