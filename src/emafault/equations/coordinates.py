@@ -4,11 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..actuator.parameters import ActuatorParameters
 from . import commutation, control, electrical, torque
 from .point import State
-from .signals import Signals
+from .signals import SPEED_SPAN, Signals, odd
 
 LEVEL = 4  # of the functions of a remainder: the current's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
@@ -29,7 +30,8 @@ SWEPT = 0.02  # of speed times shape (rad/s), for a driver of the size of one
 def functions_of(rec: Signals) -> dict[str, Any]:
     """What the samples of a recording lie along, and the functions that remainders are made of; (sample,) each."""
     w = rec.speed / 100.0
-    level = np.abs(rec.current).sum(axis=1) / 4.0
+    # what goes along a noisy current, times that current, would have a part of the noise's square for a function of it
+    level = uniform_filter1d(rec.level, max(3, odd(SPEED_SPAN / rec.interval)), mode="nearest") / 2.0
     t = rec.time / rec.time[-1] - 0.5
     x = rec.actuator.pole_pairs * rec.middle
     direction = np.where(rec.moving, rec.direction, 0.0)  # at rest its sign is the noise's

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands 
 AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
 STRETCHES = 60  # in a recording
+QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
 ON = 2e-3  # of a step, that values may lie beside a lattice by
 SMALLEST = 1e-8  # step of a lattice, of the range of its values
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
@@ -222,7 +224,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
 
     finest = min(r.interval for r in recordings)
     fine = [r for r in recordings if r.interval < 1.5 * finest]
-    angle = robust([np.diff(r.rotor_angle, 3) for r in fine]) / np.sqrt(20.0)
+    angle = min(robust([np.diff(r.rotor_angle, n) for r in fine]) / np.sqrt(comb(2 * n, n)) for n in (3, 4))
     step = max(lattice_step(x) for r in recordings for x in r.phase_current.T)
     rounding = {
         "current": step / np.sqrt(12.0), "angle": min(spacing(r.rotor_angle) for r in recordings) / np.sqrt(12.0),
@@ -240,7 +242,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     return replace(
         nominal,
         **{
-            k: float(max(np.clip(v, 0.2 * getattr(nominal, k), 5.0 * getattr(nominal, k)), rounding.get(k, 0.0)))
+            k: float(max(v, QUIETEST * getattr(nominal, k), rounding.get(k, 0.0)))
             for k, v in limits.items()
             if np.isfinite(v)
         }
