@@ -81,3 +81,26 @@ def test_of_an_output_in_counts_the_rounding_goes_with_its_place():
     fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
     assert len(names) == 6 and counts**2 / 12.0 < np.var(left) < counts**2 / 8.0
     assert np.var(left - fitted) < 0.7 * np.var(left)
+
+
+@pytest.mark.parametrize("channel", ["angle", "current", "position", "speed"])
+def test_noise_far_above_the_nominal_sensors_is_found(channel):
+    noisy = replace(NOISE, **{channel: 10.0 * getattr(NOISE, channel)})
+    found = estimated_noise([recorded(seed=seed, noise=noisy) for seed in range(2)], NOISE)
+    assert getattr(found, channel) == pytest.approx(10.0 * getattr(NOISE, channel), rel=0.05)
+
+
+def test_the_noise_s_square_does_not_go_along_the_current():
+    """A resistance that depends on the current is a function of its level, times the current: of noise in both, more is
+    left where the level is low."""
+    noisy = replace(NOISE, current=0.05)
+    products = []
+    for seed in range(6):
+        machine = machine_of({"a.nc": recorded("sine", noise=noisy, seed=seed)})
+        off = {n: p.off for n, p in machine.parameters.items()}
+        block = next(b for b in machine.blocks(off, "a.nc") if b.equation == "electrical_a")
+        level = block.coordinates["current"]
+        low = block.usable & (level < np.quantile(level[block.usable], 0.2))
+        products.append(np.mean((block.residual * block.coordinates["drivers"][1])[low]))
+    expected = -ACTUATOR.resistance * 2.0 / 3.0 * noisy.current**2  # of a current less the mean of three
+    assert np.mean(products) == pytest.approx(expected, abs=4.0 * np.std(products) / np.sqrt(len(products)))
