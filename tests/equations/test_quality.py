@@ -7,7 +7,7 @@ import pytest
 
 from emafault.equations.quality import seen, told
 
-from .conftest import recorded
+from .conftest import in_steps, recorded
 
 
 def test_what_a_range_cuts_off_is_clipped_and_neither_held_nor_a_spike():
@@ -41,3 +41,11 @@ def test_commutations_that_a_channels_gain_or_lag_shows_in_the_sum_are_no_spikes
     rows = np.random.default_rng(2).choice(np.arange(2, len(current) - 2, 4), 30, replace=False)
     current[rows, 0] += 5.0
     assert seen(replace(plain, phase_current=current))["phase_current"].spikes == 30 / len(current)
+
+
+def test_a_limit_that_a_coarse_converter_shows_again_and_again_is_no_clipping():
+    """A current that its regulator holds at the limit for some samples is the same value in each of them."""
+    coarse = in_steps(recorded(), {"phase_current": 0.05, "phase_current_end": 0.05})
+    current = coarse.phase_current.copy()
+    current[400:406, 0] = current.max() + 2.0
+    assert [t["form"] for t in told({"a.nc": seen(replace(coarse, phase_current=current))})] == ["adc_step"]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
-from emafault.equations.signals import STRETCH, Signals, estimated_noise, spacing
+from emafault.equations.signals import STRETCH, Signals, estimated_noise
+from emafault.io.lattice import spacing
 from emafault.io.sensors import spikes
 
 from .conftest import ACTUATOR, NOISE, in_steps, machine_of, recorded

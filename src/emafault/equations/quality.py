@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import cut_off, spikes
-from .signals import lattice_step
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {

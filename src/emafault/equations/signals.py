@@ -11,6 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
+from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
 from ..io.sensors import cut_off, without_spikes
 from .dual import Dual
@@ -23,8 +24,6 @@ AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
 STRETCHES = 60  # in a recording
 QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
-ON = 2e-3  # of a step, that values may lie beside a lattice by
-SMALLEST = 1e-8  # step of a lattice, of the range of its values
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
 
@@ -258,31 +257,3 @@ def _stated(recordings: Sequence[Recording]) -> dict[str, float]:
         if None not in said:
             out[channel] = float(np.sqrt(np.mean(np.square(np.array(said, float)))))
     return out
-
-
-def lattice_step(x: np.ndarray) -> float:
-    """Spacing of the lattice that a channel's values lie on; 0 where they lie on none that the samples fill."""
-    values = np.unique(x)
-    if len(values) > 0.5 * len(x) or len(values) < 3:
-        return 0.0
-    gaps = np.diff(values)
-    step = float(gaps.min())
-    times = gaps / step
-    on = np.abs(times - np.round(times)) < 1e-3 * np.maximum(times, 1.0)
-    return step if step > 1e-9 * np.ptp(x) and on.mean() > 0.99 else 0.0
-
-
-def spacing(x: np.ndarray) -> float:
-    """Spacing of the lattice that all values of a channel lie on, however few of its places they fill, as an encoder's
-    counts; 0 of others. The greatest common divisor of the gaps between values, by Euclid's algorithm."""
-    gaps = np.diff(np.unique(x))
-    if len(gaps) < 2:
-        return 0.0
-    step = float(gaps.min())
-    while step > SMALLEST * gaps.sum():
-        rest = np.abs(gaps - step * np.round(gaps / step))
-        off = rest > ON * step
-        if np.mean(off) < 0.01:
-            return step
-        step = float(rest[off].min())
-    return 0.0

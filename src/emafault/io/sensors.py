@@ -9,6 +9,7 @@ from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .command import refuse_unfollowed
+from .lattice import lattice_step
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
@@ -265,9 +266,11 @@ def cut_off(recording: Recording) -> dict[str, np.ndarray]:
         values = getattr(recording, variable)
         cut = np.zeros((len(moving), 3), bool)
         for j in range(3) if values is not None else ():
+            coarse = lattice_step(values[:, j]) > 0.0  # whose values repeat anyway
             for extreme in (np.max, np.min):
                 level, count, beside = _at_extreme(values[moving, j], extreme)
-                enough = count >= CLIPPED_FINE if beside < 1.5 else count >= max(least, 5 * beside)
+                fine = beside < 1.5 and not coarse
+                enough = count >= CLIPPED_FINE if fine else count >= max(least, 5 * beside)
                 if abs(level) > 1e-9 and enough:
                     cut[:, j] |= values[:, j] == level
         if cut.any():
