@@ -48,4 +48,5 @@ def test_a_limit_that_a_coarse_converter_shows_again_and_again_is_no_clipping():
     coarse = in_steps(recorded(), {"phase_current": 0.05, "phase_current_end": 0.05})
     current = coarse.phase_current.copy()
     current[400:406, 0] = current.max() + 2.0
+    current[[390, 392, 394], 0] = current.max() - np.array([0.05, 0.1, 0.15])  # on the way there
     assert [t["form"] for t in told({"a.nc": seen(replace(coarse, phase_current=current))})] == ["adc_step"]
