@@ -151,6 +151,10 @@ def test_of_a_large_bench_a_part_is_taken_and_said(tmp_path, capsys):
     assert main([*few, "--corrected", str(tmp_path / "new")]) == 2
     said = capsys.readouterr().err
     assert said.startswith("emafault diagnose: --corrected: 5 of 7 recordings") and not (tmp_path / "new").exists()
+    by = ["--diagnosis", str(tmp_path / "out" / "diagnosis.json")]
+    assert main(["identify", str(tmp_path / "large"), *by]) == 2
+    assert "is none of its 5 recordings" in capsys.readouterr().err
+    assert main(["identify", *(str(tmp_path / "large" / n) for n in taken), *by]) == 0
 
 
 @pytest.mark.parametrize(

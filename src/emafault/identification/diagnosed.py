@@ -40,8 +40,13 @@ def of_verdict(path: str | Path, recordings: Sequence[Path], level: float = LEVE
     try:
         vectors = verdict["fault_vector"]
         for file in recordings:
-            if file.name not in vectors or verdict["bench"] not in (file.resolve().parent.name, file.stem):
+            if verdict["bench"] not in (file.resolve().parent.name, file.stem):
                 raise InputError(f"is of the bench {shown(verdict['bench'])}, not of {shown(file)}")
+            if file.name not in vectors:
+                raise InputError(
+                    f"{shown(file)} is none of its {len(vectors)} recordings; name those, or diagnose the bench anew, "
+                    "with more --samples if it left some out"
+                )
         wider = float(ndtri(0.5 + 0.5 * level) / ndtri(0.5 + 0.5 * LEVEL))
         estimates = [_estimate(vectors[f.name], f"fault_vector.{f.name}", wider) for f in recordings]
         named = [e.replace("_", " ") for e in verdict["which"][0]["effects"] if e != "unknown"]

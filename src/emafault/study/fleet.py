@@ -17,6 +17,7 @@ from ..errors import InputError, one_line
 from ..faults import FAULT_NAMES
 from ..io.atomic import replace_atomically, write_text
 from ..io.bench import Bench, read_bench
+from ..io.enough import within
 from ..io.split import split_bench
 from ..plain import read_json
 from ..progress import progress
@@ -77,8 +78,8 @@ def row_of(
     try:
         read = read_bench(bench, actuator)
         row |= _told_by_owner(read)
-        split = split_bench(read.recordings)
-        verdict = diagnose(read.name, read.recordings, split, actuator, noise, exclude).verdict
+        taken = within(read).recordings
+        verdict = diagnose(read.name, taken, split_bench(taken), actuator, noise, exclude).verdict
     except FAILURES as error:
         return row | {"verdict": "refused", "reason": one_line(error)[:300], "seconds": time.monotonic() - start}
     return row | _told_by_verdict(verdict) | {"seconds": time.monotonic() - start}
