@@ -65,8 +65,7 @@ def spread(recordings: Mapping[str, Recording], names: Sequence[str], count: int
     order = sorted(
         names,
         key=lambda n: (
-            recordings[n].ambient_temperature, recordings[n].attributes.get("health"),
-            str(recordings[n].attributes.get("command")), n,
+            recordings[n].ambient_temperature, recordings[n].health, str(recordings[n].attributes.get("command")), n,
         ),
     )  # fmt: skip
     return sorted({order[k] for k in np.linspace(0, len(order) - 1, count).round().astype(int)})
