@@ -47,6 +47,9 @@ class Signals:
     noise: SensorNoise
     lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it
     zero_error: float = 0.0  # electrical rad, standard error of the angle's zero, where it was fitted to the voltages
+    speed_step: float = 0.0  # rad/s, of a channel whose values lie on a lattice, as the next two
+    current_step: float = 0.0  # A
+    output_step: float = 0.0  # rad, where it is more than the noise
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
@@ -59,13 +62,13 @@ class Signals:
             spiked = np.zeros(len(r.time), bool)
             spiked[rows] = True
             lost |= binary_dilation(spiked)
-        out = cls(
+        counts = spacing(r.output_position)
+        return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
-            noise, lost, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
+            noise, lost, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)), lattice_step(r.rotor_speed),
+            max(lattice_step(x) for x in r.phase_current.T), counts if counts > noise.position else 0.0,
         )  # fmt: skip
-        out.current_step = max(lattice_step(x) for x in r.phase_current.T)  # spikes were taken off the lattice
-        return out
 
     def __post_init__(self) -> None:
         theta, h = self.angle, self.interval
@@ -98,10 +101,6 @@ class Signals:
         self.level = 0.5 * np.abs(self.current).sum(axis=1)
         step = np.abs(np.diff(self.level, append=self.level[-1:]))
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
-        self.speed_step = lattice_step(self.speed_recorded)
-        self.current_step = max(lattice_step(x) for x in self.current.T)
-        counts = spacing(self.output)
-        self.output_step = counts if counts > self.noise.position else 0.0
         self.dT_measured = self.ambient - self.actuator.reference_temperature
         self.solved: dict[tuple, Any] = {}
         self._once: dict[tuple, Any] = {}
@@ -187,7 +186,6 @@ class Signals:
     def _changed(self, **signals: Any) -> "Signals":
         """A copy with other signals; what is masked and along what rows lie stays."""
         out = replace(self, **signals)
-        out.speed_step, out.current_step, out.output_step = self.speed_step, self.current_step, self.output_step
         out.moving, out.direction, out.start, out.rows_from = self.moving, self.direction, self.start, self.rows_from
         return out
 

@@ -1,8 +1,8 @@
 """Which part of a large bench a diagnosis takes: as if fewer recordings had been made, and shorter ones.
 
 The time of a diagnosis goes with the number of samples, what it tells with the root of it. Recordings are left out
-evenly over conditions, and cut at their end, so that each begins at rest with its winding at the ambient temperature,
-as the format has it. One may be longer than the others, for what is slow.
+evenly over conditions, and cut to begin shortly before their motion, so that each begins at rest with its winding at
+the ambient temperature, as the format has it. One may be longer than the others, for what is slow.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,11 +40,11 @@ def within(bench: Bench, samples: int = SAMPLES) -> Bench:
     least = {n: min(lengths[n], round(SHORTEST / r.interval)) for n, r in recordings.items()}
     longest = max(sorted(lengths), key=lambda n: lengths[n])
     one = min(lengths[longest], max(least[longest], int(OF_ONE * samples)))
-    names = [n for n in recordings if n != longest]
-    count = len(names)
-    while count > FEWEST - 1 and sum(least[n] for n in spread(recordings, names, count)) > samples - one:
+    order = _by_condition(recordings, [n for n in recordings if n != longest])
+    count = len(order)
+    while count > FEWEST - 1 and sum(least[n] for n in _evenly(order, count)) > samples - one:
         count -= 1
-    names = spread(recordings, names, count)
+    names = _evenly(order, count)
     cap = _cap([lengths[n] for n in names], samples - one)
     kept = {n: _cut(recordings[n], max(least[n], min(lengths[n], cap))) for n in names}
     kept[longest] = _cut(recordings[longest], one)
@@ -62,13 +62,21 @@ def within(bench: Bench, samples: int = SAMPLES) -> Bench:
 
 def spread(recordings: Mapping[str, Recording], names: Sequence[str], count: int) -> list[str]:
     """Names of so many of the recordings, spread over temperatures, health and commands."""
-    order = sorted(
+    return sorted(_evenly(_by_condition(recordings, names), count))
+
+
+def _by_condition(recordings: Mapping[str, Recording], names: Sequence[str]) -> list[str]:
+    return sorted(
         names,
         key=lambda n: (
             recordings[n].ambient_temperature, recordings[n].health, str(recordings[n].attributes.get("command")), n,
         ),
     )  # fmt: skip
-    return sorted({order[k] for k in np.linspace(0, len(order) - 1, count).round().astype(int)})
+
+
+def _evenly(order: Sequence[str], count: int) -> set[str]:
+    """So many of an order, at equal distances."""
+    return {order[k] for k in np.linspace(0, len(order) - 1, count).round().astype(int)}
 
 
 def _cap(lengths: Sequence[int], samples: int) -> int:

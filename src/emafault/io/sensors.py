@@ -266,11 +266,11 @@ def cut_off(recording: Recording) -> dict[str, np.ndarray]:
         values = getattr(recording, variable)
         cut = np.zeros((len(moving), 3), bool)
         for j in range(3) if values is not None else ():
-            coarse = lattice_step(values[:, j]) > 0.0  # whose values repeat anyway
             for extreme in (np.max, np.min):
                 level, count, beside = _at_extreme(values[moving, j], extreme)
-                fine = beside < 1.5 and not coarse
-                enough = count >= CLIPPED_FINE if fine else count >= max(least, 5 * beside)
+                enough = count >= max(least, 5 * beside)
+                if not enough and count >= CLIPPED_FINE and beside < 1.5:
+                    enough = lattice_step(values[:, j]) == 0.0  # of a coarse channel values repeat anyway
                 if abs(level) > 1e-9 and enough:
                     cut[:, j] |= values[:, j] == level
         if cut.any():
