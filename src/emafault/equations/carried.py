@@ -25,6 +25,8 @@ DRIVERS: dict[str, tuple[str, ...]] = {
     "position": ("output", "output_play", "output_twist"),
     "bus": ("bus_voltage",),
 }  # fmt: skip
+#: how a channel comes late -> form
+SMOOTH = {"smoothed": "smoothing", "filtered": "low_pass"}
 
 
 def of_form(
@@ -80,8 +82,11 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     kind, _, channel = unit.removeprefix("~").partition("_")
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
-        lag = sum(-v if name.endswith("_early") else v for name, v in values.items())
-        return _rounded({"place": channel, "form": "lag", "lag": lag})
+        ((name, amount),) = values.items()
+        way = name.rpartition("_")[2]
+        if way in SMOOTH:
+            return _rounded({"place": channel, "form": SMOOTH[way], "delay": amount})
+        return _rounded({"place": channel, "form": "lag", "lag": -amount if way == "early" else amount})
     if kind == "crosstalk":
         ((pair, gain),) = values.items()
         return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})

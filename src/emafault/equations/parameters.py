@@ -130,12 +130,13 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
 def measuring_chain(recordings: Collection[str]) -> list[Unit]:
     """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drift."""
     out = []
-    for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
+    for channel in ("voltage", "current", "output", "speed"):
+        # that the speed's comes late is in the catalogue
+        ways = ("late", "early", "smoothed", "filtered") if channel != "speed" else ("early",)
         variants = [
-            Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
-            for side in ("late", "early")
+            Variant([Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG) for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
+        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=4.0, alike=len(ways) > 1))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
@@ -150,6 +151,16 @@ def measuring_chain(recordings: Collection[str]) -> list[Unit]:
             drift = Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0)
             out.append(drift)
     return out
+
+
+def controller(a: ActuatorParameters) -> list[Unit]:
+    """What a controller may do that the nominal one does not: filter its command, feed the command's speed forward."""
+    loop = 1.0 / a.position_gain  # s, of the position's loop
+    of = {
+        "filter": Parameter("command.filter", 0.0, 0.0, loop, "s"),
+        "feedforward": Parameter("command.feedforward", 0.0, 0.0, 1.0, "1"),
+    }
+    return [Unit(f"~controller_{name}", "form", ("control",), [Variant([p], [1])]) for name, p in of.items()]
 
 
 def _fault(full: str, component: str) -> Parameter:
