@@ -106,6 +106,26 @@ def test_a_position_gain_changes_no_plant_effect(cogging):
     assert gain["low"] < 130.0 < gain["high"] and gain["nominal"] == 100.0
 
 
+@pytest.mark.parametrize(
+    ("form", "parameter", "size"),
+    [("command_filter", "filter", {"time_constant": 0.004}), ("feedforward", "feedforward", {"gain": 0.5})],
+)
+def test_what_a_controller_does_with_its_command_is_told_and_no_gap_of_the_machine(form, parameter, size):
+    """Without forms of their own a filter had been told as a delay, and both as another position gain."""
+    entries = [{"place": "command", "form": form, **size}]
+    recordings = {
+        f"r{n}.nc": recorded(c, None, (0.0,) * 5 + (dT,), seed=n, theta_0=theta_0, unlisted=entries)
+        for n, (c, dT, theta_0) in enumerate(PLANS)
+    }
+    verdict = verdict_of(recordings)
+    assert verdict["verdict"] == "no_gap" and verdict["inclusion"]["control_delay"] < 0.5
+    (told,) = verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("controller", "control")
+    assert told["parameters"][f"command.{parameter}"]["value"] == pytest.approx(*size.values(), rel=0.05)
+    gain = verdict["controller"]["position_gain"]
+    assert gain["low"] < 100.0 < gain["high"]
+
+
 def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     late = {}
     for name, r in bench(COGGING).items():

@@ -321,7 +321,7 @@ class NormalEquations(Point):
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
             on.add(unit.id)
-        promise = np.inf if switched else self._promise(model, given, normal)
+        decrement = np.inf if switched else self._decrement(moved, normal)
         found = self.after(moved)
         for unit in self.units:
             if unit.id not in inside:
@@ -330,20 +330,14 @@ class NormalEquations(Point):
         for unit, p, d in switched:
             self._switch_on(unit, p, d)
         self.on = on
-        return promise
+        return decrement
 
-    def _promise(self, model: Model, step: Mapping[str, float], normal: Normal) -> float:
-        """Log evidence that a step promises, over that of the point with the columns beside it at their best."""
-        names = [n for n in step if n in normal.index]
+    def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
+        names = [n for n in moved if n in normal.index]
         k = np.array([normal.index[n] for n in names], int)
-        d, mean, sd = (
-            np.array([step[n] for n in names]),
-            np.array([self.prior(n)[0] for n in names]),
-            self.widths(names, model),
-        )
-        after = normal.g[k] @ d + 0.5 * d @ normal.H[np.ix_(k, k)] @ d + 0.5 * np.sum(((d - mean) / sd) ** 2)
-        mine = [is_parameter(n) for n in names]
-        return float(0.5 * np.sum((mean[mine] / sd[mine]) ** 2) - self.gained_beside(model, normal) - after)
+        d = np.array([moved[n] for n in names])
+        sd = np.array([self.prior(n)[1] for n in names])
+        return float(0.5 * (d @ normal.H[np.ix_(k, k)] @ d + np.sum((d / sd) ** 2)))
 
     def gained_beside(self, model: Model, normal: Normal) -> float:
         """Log evidence that a model's columns which are no parameters gain at the point (variable projection; Golub and

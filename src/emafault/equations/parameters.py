@@ -21,6 +21,7 @@ SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings hav
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
+MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
@@ -134,7 +135,13 @@ def measuring_chain(recordings: Collection[str]) -> list[Unit]:
         # that the speed's comes late is in the catalogue
         ways = ("late", "early", "smoothed", "filtered") if channel != "speed" else ("early",)
         variants = [
-            Variant([Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG) for way in ways
+            Variant(
+                [Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")],
+                [1],
+                LEAST_LAG,
+                [LEAST_LAG] if way in MADE else (),
+            )
+            for way in ways
         ]
         out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=4.0, alike=len(ways) > 1))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
