@@ -61,6 +61,11 @@ class Unit:
     alike: bool = False  # whether its variants look alike near off, and are told apart at their own optima alone
 
     @property
+    def of_controller(self) -> bool:
+        """Whether it is a form of the controller alone: no evidence for or against what a machine has."""
+        return self.kind == "form" and bool(self.equations) and set(self.equations) <= set(SETTINGS)
+
+    @property
     def parameters(self) -> list[Parameter]:
         """Every parameter of every variant."""
         every = [p for v in self.variants for p in v.parameters]

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
-from .model import SETTINGS, WORDS, Unit
+from .model import WORDS, Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
@@ -93,8 +93,7 @@ class Search:
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
         self.counts = listed, len(WORDS), every.count("remainder")
-        # what a controller does is no evidence for or against what a machine has
-        self.of_controller = {u.id for u in units if u.kind == "form" and set(u.equations) <= set(SETTINGS)}
+        self.of_controller = {u.id for u in units if u.of_controller}
         flat = list(candidates.values())
         self.flat = (
             np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
