@@ -353,7 +353,8 @@ class Bench(NormalEquations):
         began: Began | None = None
         if normal is not None:
             begun = dict(self.point), set(self.on)
-            began = Began(dict(self.point), self._misfits(normal, model, True))
+            if self.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
+                began = Began(dict(self.point), self._misfits(normal, model, True))
             ahead = to_come = self.move(model, normal)
             if ahead < self.settled:
                 return model
@@ -366,8 +367,8 @@ class Bench(NormalEquations):
                 if to_come < enough:
                     break
                 found, at_point, misfits = self._nearer(model, corrected, began)
-                began, ended = Began(dict(self.point), misfits), began
-                if ended is not None and ended.point == began.point:
+                began, ended = Began(dict(self.point), misfits) if self.on <= set(model.units) else None, began
+                if ended is not None and began is not None and ended.point == began.point:
                     to_come = 0.0
                     break
                 before, ahead = ahead, self.move(found, at_point)
