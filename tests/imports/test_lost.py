@@ -34,7 +34,9 @@ def test_hall_sensors_do_for_an_encoder(wiring, fine, truth, tmp_path):
     given["signals"]["rotor_angle"] = {"hall": [f"h{letter}" for letter in wiring]}
     result = bring(tmp_path, given, log=raw)
     recording = result.recordings["one.nc"]
-    assert set(off(recording, truth)) <= {"rotor_angle"} and recording.known["rotor_angle"]["source"] == "hall"
+    known = recording.known["rotor_angle"]
+    assert set(off(recording, truth)) <= {"rotor_angle"} and set(known) == {"source", "zero_error"}
+    assert known["source"] == "hall" and known["zero_error"] > 0.0
     turn = recording.rotor_angle - truth["rotor_angle"]
     turn = ACTUATOR.pole_pairs * (turn - ELECTRICAL * np.round(np.median(turn) / ELECTRICAL))
     moving = np.abs(truth["rotor_speed"]) > 50.0
@@ -62,4 +64,5 @@ def test_an_electrical_angle_is_divided_by_the_pole_pairs(fine, truth, tmp_path)
     turned = log(fine).change(angle=lambda v: np.rad2deg(ACTUATOR.pole_pairs * v) % 360.0)
     result = bring(tmp_path, given, log=turned)
     assert off(result.recordings["one.nc"], truth) == []
-    assert result.recordings["one.nc"].known["rotor_angle"]["source"] == "electrical"
+    known = result.recordings["one.nc"].known["rotor_angle"]
+    assert set(known) == {"source", "zero_error"} and known["source"] == "electrical" and known["zero_error"] > 0.0
