@@ -1,10 +1,11 @@
-"""Diagnoses of benches whose channels come in coarse steps or are noisier than the reference's.
+"""Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's or filtered, or whose
+controller does more with its command.
 
     python benchmarks/channels.py [--only "encoder of 4096 counts" ...]
 
 Six recordings of 0.6 s of one unit a bench, once without effect, once with a contact resistance in phase a, once with
-Stribeck friction. Printed for each: what was named, and what was told beside it and the steps themselves. All noise is
-that of voltages, currents, speed and positions.
+Stribeck friction. Printed for each: what was named, and what was told beside it and the steps or filters themselves.
+All noise is that of voltages, currents, speed and positions; the sensors' filter that of voltages, currents and speed.
 """
 
 import argparse
@@ -22,6 +23,8 @@ EFFECTS = {
     "stribeck": ("effects.stribeck.a=0.02",),
 }  # fmt: skip
 SPEC = config.diagnosis_spec(config.compose())
+THEMSELVES = ("adc_step", "lag", "controller")
+TRUE = {"sensors' filter of 5 kHz": ("speed_latency",)}  # what a channel is, of the listed effects
 NOISY = ("voltage", "current", "current_end", "speed", "angle", "position")
 
 
@@ -33,6 +36,11 @@ def in_steps(place: str, step: float) -> tuple[str, ...]:
 def noisier(factor: float, *channels: str) -> tuple[str, ...]:
     """Overrides by which channels, or all, have so many times their noise."""
     return tuple(f"sensors.{n}={factor * SPEC['sensors'][n]:g}" for n in channels or NOISY)
+
+
+def entry(place: str, form: str, **numbers: float) -> tuple[str, ...]:
+    """Overrides by which a form acts at a place."""
+    return (f"unlisted=[{{place: {place}, form: {form}, {', '.join(f'{n}: {x:g}' for n, x in numbers.items())}}}]",)
 
 
 CHANNELS = {
@@ -48,6 +56,11 @@ CHANNELS = {
     "voltages' noise ten times": noisier(10.0, "voltage"),
     "speed's noise ten times": noisier(10.0, "speed"),
     "angle's noise ten times": noisier(10.0, "angle"),
+    "currents smoothed": entry("current", "smoothing", delay=0.4),
+    "voltages smoothed": entry("voltage", "smoothing", delay=0.4),
+    "sensors' filter of 5 kHz": ("recording.filter={kind: first_order, cutoff: 5000, before_noise: true}",),
+    "filter of the command": entry("command", "command_filter", time_constant=0.005),
+    "feed-forward": entry("command", "feedforward", gain=0.5),
 }
 
 
@@ -65,8 +78,9 @@ def main() -> None:
                 simulate_bench(folder, Case(6, 0.6, (*overrides, *CHANNELS[channel])))
                 verdict = diagnose_bench(read_bench(folder, ActuatorParameters(**SPEC["actuator"])), SPEC).verdict
                 named = verdict["which"][0]["effects"]
-                told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"] if d["form"] != "adc_step"]
-                count, right = count + 1, right + (named == ([] if effect == "none" else [effect]))
+                told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"] if d["form"] not in THEMSELVES]
+                wanted = {*([] if effect == "none" else [effect]), *TRUE.get(channel, ())}
+                count, right = count + 1, right + (set(named) == wanted)
                 clean += not told
                 beside = f"; beside it {', '.join(told)}" if told else ""
                 p = verdict["which"][0]["probability"]

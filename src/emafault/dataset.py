@@ -166,13 +166,19 @@ def simulate_and_measure(
     first_run : number of the first run, which its noise and whatever else is left to chance go by
     recording : name of the recording that is replayed, if any
     """
+    from .actuator.commands import seen_by_controller
     from .actuator.sensors import SensorNoise, measure
-    from .actuator.simulate import simulate
+    from .actuator.simulate import commanded_position, simulate
     from .actuator.unlisted import in_machine
 
     unlisted, seed = spec.get("unlisted", ()), spec["seed"]
     terms = in_machine(unlisted, len(runs), seed, first_run, recording)
-    signals = simulate(runs, command, duration, interval, terms=terms)
+    period = float(runs["control_period"][0])
+    seen = seen_by_controller(command, unlisted, period, float(runs["position_gain"][0]))
+    signals = simulate(runs, seen, duration, interval, terms=terms)
+    if seen is not command:  # what is recorded is what the bench commands
+        ends = interval * np.arange(1, signals["commanded_position"].shape[1] + 1)
+        signals["commanded_position"][:] = commanded_position(command, period, ends)
     low_pass = spec.get("recording", {}).get("filter")
     if low_pass and low_pass["before_noise"]:
         signals = low_passed(signals, interval, low_pass)

@@ -428,7 +428,7 @@ def _check_parameter(value: Any, name: str, place: str, form: str, key: str) -> 
     if name == "values" and not (isinstance(value, list) and len(value) == grammar.KNOTS):
         refuse(key, value, f"a list of {grammar.KNOTS} numbers, at equally spaced knots")
     low, high, unit = grammar.PARAMETERS.get(name, (*grammar.ANY, ""))
-    share = form != "memory" and grammar.PLACES[place] == "1"
+    share = form != "memory" and grammar.PLACES[place] == "1" and place not in grammar.CONTROLLER
     if not unit and share and name not in ("from", "to"):
         low, high = max(low, -grammar.SHARE), min(high, grammar.SHARE)
     accepted = {"low": low, "high": high, "unit": unit or ("" if name in ("from", "to") else grammar.PLACES[place])}

@@ -68,6 +68,14 @@ def test_channels_faults(true):
     np.testing.assert_allclose(late[1:], 0.3 * (v[:-1] - v[1:]), atol=1e-12)
     early = changed(true, place="output", form="lag", lag=-1.0)["output_position"]
     np.testing.assert_allclose(early[:-1], np.diff(true["output_position"][0]), atol=1e-12)
+    smooth = changed(true, place="current", form="smoothing", delay=0.4)["phase_current_end"]
+    smooth = smooth + true["phase_current_end"][0]
+    back = smooth[1:] + 0.4 * np.diff(smooth, axis=0)
+    np.testing.assert_allclose(back, true["phase_current_end"][0, 1:], atol=1e-12)
+    passed = changed(true, place="speed", form="low_pass", delay=3.0)["rotor_speed"] + true["rotor_speed"][0]
+    at = slice(500, 900)  # of a steady acceleration: late by the time constant
+    rate = np.gradient(true["rotor_speed"][0])
+    np.testing.assert_allclose((true["rotor_speed"][0] - passed)[at].mean(), 3.0 * rate[at].mean(), rtol=0.1)
     bent = changed(true, place="voltage", form="sensor_curve", bend=0.05)["phase_voltage"]
     np.testing.assert_allclose(bent, -0.05 * v * (v / 24.0) ** 2, atol=1e-12)
     drift = changed(true, place="current_c", form="drift", at_end=0.2)["phase_current"][:, 2]
@@ -85,7 +93,7 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "lag", "sensor_curve", "drift", "clipping", "adc_step", "held", "spikes"
+        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "drift", "clipping", "adc_step", "held", "spikes"
     }  # fmt: skip
 
 

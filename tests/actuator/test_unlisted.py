@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from emafault.actuator.commands import command_positions
+from emafault.actuator.commands import command_positions, seen_by_controller
 from emafault.actuator.fixed_step import simulate_fixed_step
 from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import simulate
 from emafault.actuator.unlisted import COORDINATES, PLACES, SHAPES, acting, remembered, term
 from emafault.config import reference_actuator
+from emafault.dataset import simulate_and_measure
 from emafault.effects import EFFECTS
 from emafault.errors import InputError
 
@@ -212,3 +213,23 @@ def test_too_many_terms():
     runs = make_runs(ACTUATOR, np.zeros((1, 6)))
     with pytest.raises(InputError, match="terms: got 9, accepted are 8"):
         simulate(runs, TO_AND_FRO, 0.2, 2e-4, terms=np.repeat(term("torque", "table", amplitude=1.0)[None], 9, axis=0))
+
+
+def test_a_controller_sees_its_command_late_and_ahead_and_the_command_is_recorded_as_it_is():
+    filtered = {"place": "command", "form": "command_filter", "time_constant": 0.005}
+    ahead = {"place": "command", "form": "feedforward", "gain": 0.5}
+    ramp = 0.2 * 1e-3 * np.arange(202)
+    late = seen_by_controller(ramp, [filtered], 1e-3, 100.0)
+    np.testing.assert_allclose((ramp - late)[100:], 0.2 * 0.005, rtol=1e-6)  # by the time constant
+    np.testing.assert_allclose(seen_by_controller(ramp, [ahead], 1e-3, 100.0) - ramp, 0.5 / 100.0 * 0.2)
+    assert seen_by_controller(ramp, [{"place": "torque", "form": "order"}], 1e-3, 100.0) is ramp
+    actuator = reference_actuator()
+    runs = make_runs(actuator, np.zeros((1, 6)))
+    noise = {"voltage": 0.0, "current": 0.0, "current_end": 0.0, "speed": 0.0, "angle": 0.0, "position": 0.0}
+    spec = {"seed": 0, "sensors": noise | {"bus_voltage": 0.0, "ambient": 0.0}}
+    command = command_positions("ramp", {"speed": 0.2}, 0.2, actuator.control_period)
+    plain = simulate_and_measure(spec, runs, command, 0.2, 2e-4)
+    other = simulate_and_measure(spec | {"unlisted": [filtered]}, runs, command, 0.2, 2e-4)
+    np.testing.assert_array_equal(other["commanded_position"], plain["commanded_position"])
+    lag = (plain["output_position"] - other["output_position"])[0, -100:].mean()
+    assert lag == pytest.approx(0.2 * 0.005, rel=0.05)

@@ -1,10 +1,11 @@
-"""Steps of the point within the reach of the priors."""
+"""Steps of the point within the reach of the priors, and to where a set fits better."""
 
 import numpy as np
 import pytest
 
 from emafault.diagnosis.fit import NOTHING, Bench
-from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Variant
+from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Unit, Variant
+from emafault.diagnosis.search import Choice, Model
 
 ROWS = 4000
 
@@ -31,6 +32,68 @@ def test_what_is_held_at_the_end_of_its_prior_is_held_while_the_others_are_fitte
     assert bench.point["a"] == bench.reach
     b = normal.index["b"]
     assert abs(bench.point["b"] + normal.g[b]) < 1e-6 * normal.H[b, b]
+
+
+def test_a_cause_is_fitted_beside_what_is_held_at_the_end_of_its_prior():
+    """Fitted beside a nuisance that may go anywhere, a cause of nearly the same column would end where it makes up for
+    a nuisance that is not there."""
+
+    class WithCause(Machine):
+        units = (Unit("b", "structural", ("torque",), [Variant([Machine.parameters["b"]])]),)
+        parameters = {"a": Parameter("a", 0.0, 0.0, 1.0), "b": Parameter("b", 0.0, 0.0, 10.0)}  # noqa: RUF012
+
+    bench = Bench(WithCause(), ["r"])
+    model = Model((Choice("b", 0, 1.0),), 0.0, 0.0, {}, {})
+    found, normal = bench._fitted(model, corrected=False)
+    assert found.deviations["b"] < 0.0  # with the nuisance at 5
+    bench.move(found, normal)
+    assert bench.point["a"] == bench.reach
+    again = bench.normal(bench.linearise(model, corrected=False), model)
+    assert abs(bench.point["b"]) < 0.05 and abs(again.g[again.index["b"]]) < 0.01 * again.H[0, 0]
+
+
+class Bent(Machine):
+    """A cause whose derivative vanishes far from where it is, at 3: each full Gauss-Newton step goes further away."""
+
+    units = (Unit("c", "structural", ("torque",), [Variant([Parameter("c", 0.0, 0.0, 50.0)])]),)
+    parameters = {"a": Parameter("a", 0.0, 0.0, 1.0), "c": Parameter("c", 0.0, 0.0, 50.0)}  # noqa: RUF012
+
+    def blocks(self, values, recording, wanted=None, disturbed=False):
+        noise, one, other = np.random.default_rng(1).standard_normal((3, ROWS))
+        off = values["c"] - 3.0
+        columns = {"a": one, "c": 10.0 * other / (1.0 + off**2)}
+        residual = noise + values["a"] * one + 10.0 * np.arctan(off) * other
+        return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+
+def test_a_step_after_which_a_set_fits_worse_is_shortened():
+    bench = Bench(Bent(), ["r"])
+    model = Model((Choice("c", 0, 1.0),), 0.0, 0.0, {}, {})
+    assert bench._fitted(model, corrected=False)[0].deviations["c"] > 9.0
+    bench.settle(model, steps=6)
+    assert bench.point["c"] == pytest.approx(3.0, abs=0.01)
+
+
+def test_one_of_variants_that_look_alike_near_off_is_the_best_at_its_own_optimum():
+    class Alike(Machine):
+        a, c, d = (Parameter(n, 0.0, 0.0, 1.0) for n in "acd")
+        parameters = {"a": a, "c": c, "d": d}  # noqa: RUF012
+        units = (Unit("u", "form", ("torque",), [Variant([c]), Variant([d])], alike=True),)
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other, second = np.random.default_rng(2).standard_normal((4, ROWS))
+            c, d = values["c"], values["d"]
+            columns = {"a": one, "c": other + 2.0 * c * second, "d": other - 2.0 * d * second}
+            made = (c + d) * other + (c**2 - d**2) * second
+            residual = noise + values["a"] * one + made - (0.5 * other - 0.25 * second)  # it is d
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    bench = Bench(Alike(), ["r"])
+    taken = bench.settle(Model((Choice("u", 0, 1.0),), 0.0, 0.0, {}, {}))
+    assert bench.point["c"] > 0.2
+    best = bench._by_own_variants(taken)
+    assert [c.variant for c in best.choices] == [1]
+    assert bench.point["c"] == 0.0 and bench.point["d"] == pytest.approx(0.5, abs=0.1)
 
 
 def test_a_unit_at_the_end_of_its_tolerance_is_within_reach():

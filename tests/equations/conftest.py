@@ -8,8 +8,9 @@ import pytest
 from emafault import config
 from emafault.actuator.commands import command_positions
 from emafault.actuator.parameters import ActuatorParameters, make_runs
-from emafault.actuator.sensors import SensorNoise, measure
-from emafault.actuator.simulate import simulate, time_axis
+from emafault.actuator.sensors import SensorNoise
+from emafault.actuator.simulate import time_axis
+from emafault.dataset import simulate_and_measure
 from emafault.equations.machine import ReferenceActuator
 from emafault.equations.signals import Signals
 from emafault.io.recording import Recording
@@ -36,11 +37,14 @@ def recorded(
     health="healthy",
     noise=NOISE,
     settings=None,
+    unlisted=(),
 ):
-    """A recording of a unit with these effects and faults."""
+    """A recording of a unit with these effects and faults, by entries of ``unlisted`` of the measuring chain and of the
+    controller."""
     runs = make_runs(actuator, np.array([fault]), effects=effects or {}, theta_0=theta_0)
     position = command_positions(command, settings or (COMMANDS | STEP)[command], 0.8, actuator.control_period)
-    out = measure(simulate(runs, position, 0.8, interval), runs, noise, seed)
+    spec = {"seed": seed, "unlisted": unlisted, "sensors": vars(noise)}
+    out = simulate_and_measure(spec, runs, position, 0.8, interval)
     ambient = float(out.pop("ambient_temperature")[0])
     return Recording(
         time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": health, "command": command},

@@ -119,6 +119,18 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
         ("~lag_voltage", {"lag.voltage_late": 0.4}, {"place": "voltage", "form": "lag", "lag": 0.4}),
         ("~lag_output", {"lag.output_early": 0.4}, {"place": "output", "form": "lag", "lag": -0.4}),
         (
+            "~controller_feedforward",
+            {"command.feedforward": 0.4},
+            {"place": "command", "form": "feedforward", "gain": 0.4},
+        ),
+        (
+            "~controller_filter",
+            {"command.filter": 0.004},
+            {"place": "command", "form": "command_filter", "time_constant": 0.004},
+        ),
+        ("~lag_current", {"lag.current_smoothed": 0.4}, {"place": "current", "form": "smoothing", "delay": 0.4}),
+        ("~lag_voltage", {"lag.voltage_filtered": 0.4}, {"place": "voltage", "form": "low_pass", "delay": 0.4}),
+        (
             "~crosstalk_current",
             {"crosstalk.ab": 0.05},
             {"place": "current_a", "form": "crosstalk", "source": "b", "gain": 0.05},

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.equations.corrected import write_corrected
+from emafault.equations.corrected import corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
+from emafault.first_order import smoothed
 from emafault.io.recording import read_recording
 
 from .conftest import ACTUATOR, NOISE, in_steps, recorded
@@ -105,6 +106,26 @@ def test_a_position_gain_changes_no_plant_effect(cogging):
     assert gain["low"] < 130.0 < gain["high"] and gain["nominal"] == 100.0
 
 
+@pytest.mark.parametrize(
+    ("form", "parameter", "size"),
+    [("command_filter", "filter", {"time_constant": 0.004}), ("feedforward", "feedforward", {"gain": 0.5})],
+)
+def test_what_a_controller_does_with_its_command_is_told_and_no_gap_of_the_machine(form, parameter, size):
+    """Without forms of their own a filter had been told as a delay, and both as another position gain."""
+    entries = [{"place": "command", "form": form, **size}]
+    recordings = {
+        f"r{n}.nc": recorded(c, None, (0.0,) * 5 + (dT,), seed=n, theta_0=theta_0, unlisted=entries)
+        for n, (c, dT, theta_0) in enumerate(PLANS)
+    }
+    verdict = verdict_of(recordings)
+    assert verdict["verdict"] == "no_gap" and verdict["inclusion"]["control_delay"] < 0.5
+    (told,) = verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("controller", "control")
+    assert told["parameters"][f"command.{parameter}"]["value"] == pytest.approx(*size.values(), rel=0.05)
+    gain = verdict["controller"]["position_gain"]
+    assert gain["low"] < 100.0 < gain["high"]
+
+
 def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     late = {}
     for name, r in bench(COGGING).items():
@@ -114,6 +135,25 @@ def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     assert verdict["which"][0]["effects"] == ["cogging"]
     assert [d["form"] for d in verdict["discovered"]] == ["lag"]
     assert verdict["verdict"] == "partly"
+
+
+def test_smoothed_currents_are_told_and_undone():
+    """A logger's exponential smoothing looks like a lag near none, and as an inductance that is another."""
+    true, smooth = bench(COGGING), {}
+    for name, r in true.items():
+        means, ends = (np.apply_along_axis(smoothed, 0, x, 0.4) for x in (r.phase_current, r.phase_current_end))
+        smooth[name] = replace(r, phase_current=means, phase_current_end=ends)
+    names = list(smooth)
+    found = diagnose("bench", smooth, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("lag", "sensor_current") and "smoothed" in told["sentence"]
+    assert told["parameters"]["lag.current_smoothed"]["value"] == pytest.approx(0.4, abs=0.02)
+    undone, what = corrected(found, smooth)
+    assert what == ["lag of the current channel"]
+    for name, r in undone.items():
+        off = r.phase_current - true[name].phase_current
+        assert np.std(off) < 0.1 * np.std(smooth[name].phase_current - true[name].phase_current)
 
 
 def test_a_pickup_is_described_and_the_effect_beside_it_is_named():

@@ -99,7 +99,7 @@ def test_a_bench_of_the_actuator_gives_the_matrices_that_data_are_drawn_from():
     assert np.allclose(bench.root @ bench.root.T, bench.normal.H) and bench.carrying
     row = check_draw(bench, np.random.default_rng(2), SAMPLES, 1.0, 1.0)
     assert len(row["on"]) == len(row["units"]) and all(0 <= row[a]["nuisance"] <= SAMPLES for a in ARMS)
-    calibration = [c for c in bench.candidates.values() if c.hole.size]
+    calibration = [c for (unit, _), c in bench.candidates.items() if c.hole.size and not unit.startswith("~")]
     assert calibration and all(int(q) in bench.tolerance for c in calibration for q in bench.rest[c.index])
 
 

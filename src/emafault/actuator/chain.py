@@ -1,7 +1,7 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
-Order: what a shape adds to a channel, the channel's curve, crosstalk, lag and drift; the sensors' noise; then spikes,
-held samples, clipping and the converter's steps.
+Order: what a shape adds to a channel, the channel's curve, crosstalk, lag or filter, and drift; the sensors' noise;
+then spikes, held samples, clipping and the converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .grammar import FACTORS, MACHINE, PHASES, SHAPES, of_recording
+from ..first_order import filtered, smoothed
+from .grammar import CONTROLLER, FACTORS, MACHINE, PHASES, SHAPES, of_recording
 from .motor import AXIS, trapezoid
 from .unlisted import PLACES, drawn_phase, followed, row_of
 
@@ -19,8 +20,10 @@ RECORDED = {
     "voltage": ("phase_voltage",), "current": ("phase_current", "phase_current_end"), "speed": ("rotor_speed",),
     "angle": ("rotor_angle",), "output": ("output_position",), "bus": ("bus_voltage",),
 }  # fmt: skip
+#: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
+LATE = ("lag", "smoothing", "low_pass")
 AFTER_NOISE = ("spikes", "held", "clipping", "adc_step")
-ORDER = ("", "sensor_curve", "crosstalk", "lag", "drift", *AFTER_NOISE)  # of the forms, shapes first
+ORDER = ("", "sensor_curve", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 
@@ -45,7 +48,7 @@ class Chain:
         number: int,
         recording: str,
     ):
-        mine = [of_recording(e, recording) for e in entries if e["place"] not in MACHINE]
+        mine = [of_recording(e, recording) for e in entries if e["place"] not in MACHINE | CONTROLLER]
         self.entries = sorted(mine, key=lambda e: ORDER.index("" if e["form"] in SHAPES else e["form"]))
         self.run, self.interval, self.seed, self.number = run, interval, seed, number
 
@@ -125,7 +128,7 @@ class Chain:
         return np.mean(shape, axis=1) * true["rotor_speed"]
 
     def _change(self, x: np.ndarray, entry: Mapping[str, Any]) -> None:
-        """Curve, lag or drift of a channel (time,) or (time, phase), in place."""
+        """Curve, lag, filter or drift of a channel (time,) or (time, phase), in place."""
         form, quantity = entry["form"], entry["place"].partition("_")[0]
         if form == "sensor_curve":
             full = self.run["current_limit"] if quantity == "current" else 0.5 * self.run["bus_voltage"]
@@ -134,6 +137,9 @@ class Chain:
             lag = entry["lag"]
             other = np.concatenate([x[:1], x[:-1]]) if lag > 0.0 else np.concatenate([x[1:], x[-1:]])
             x += abs(lag) * (other - x)
+        elif form in ("smoothing", "low_pass"):
+            through = smoothed if form == "smoothing" else filtered
+            x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
         elif form == "drift":
             x += entry["at_end"] * (np.arange(len(x)) + 0.5) / len(x)
 

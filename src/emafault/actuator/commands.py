@@ -1,12 +1,15 @@
 """Position commands at the user shaft, sampled at the control ticks."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, one_line, shown
+from ..first_order import filtered
 from ..places import file_at
+from .grammar import CONTROLLER
 
 LARGEST_POSITION = 100.0  # rad of a commanded position
 CORNER = 20.0  # times the bends beside it, from which a bend of a recorded command is a corner
@@ -100,6 +103,20 @@ def read_command(path: str | Path, duration: float, control_period: float) -> np
     if not np.all(np.abs(table[:, 1]) <= LARGEST_POSITION):
         raise InputError(f"{what} {shown(path)}: positions up to {LARGEST_POSITION:g} rad are accepted")
     return resample(table[:, 0], table[:, 1], duration, control_period)
+
+
+def seen_by_controller(
+    command: np.ndarray, entries: Sequence[Mapping[str, Any]], control_period: float, position_gain: float
+) -> np.ndarray:
+    """A command (..., tick) as a controller compares it with the position, by entries of ``unlisted``: through its
+    filter, and ahead by what it feeds forward of the command's speed, over the position gain (1/s)."""
+    out = command
+    for entry in (e for e in entries if e["place"] in CONTROLLER):
+        if entry["form"] == "command_filter":
+            out = np.apply_along_axis(filtered, -1, out, entry["time_constant"] / control_period)
+        else:
+            out = out + entry["gain"] / position_gain * np.gradient(command, control_period, axis=-1)
+    return out
 
 
 def resample(time: np.ndarray, position: np.ndarray, duration: float, control_period: float) -> np.ndarray:

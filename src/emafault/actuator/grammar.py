@@ -1,7 +1,8 @@
 """What may act that no catalogue lists: places, forms and their parameters, as a configuration names them.
 
 An entry of ``unlisted`` in a configuration has a place, a form and the form's parameters. In the machine it acts in the
-simulated physics (``unlisted.py``), in the measuring chain on what is recorded (``chain.py``).
+simulated physics (``unlisted.py``), in the measuring chain on what is recorded (``chain.py``), in the controller on its
+command (``commands.py``).
 """
 
 from collections.abc import Mapping
@@ -26,7 +27,9 @@ FACTORS = {
     "speed_scale": "1", **{f"current_gain_{j}": "1" for j in PHASES},
     **{f"voltage_per_speed_{j}": "V s/rad" for j in PHASES}, "output_play": "rad", "output_twist": "rad s2",
 }  # fmt: skip
-PLACES = MACHINE | CHANNELS | FACTORS
+#: what a controller may do with its command before it compares it -> unit
+CONTROLLER = {"command": "1"}
+PLACES = MACHINE | CHANNELS | FACTORS | CONTROLLER
 #: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
 #: of the magnitudes), the angle turned since the start over the gear ratio, time, the initial winding temperature
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
@@ -43,6 +46,7 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
     "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "lag": (-1.0, 1.0, "recording intervals"),
+    "delay": (0.0, 100.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
 SHARE = 0.9  # largest, of what a form adds as a share
@@ -53,10 +57,13 @@ SHAPES = {
     "memory": ("gain", "time_constant", "source"), "function": ("along", "from", "to", "values"),
 }  # fmt: skip
 OF_CHANNELS = {
-    "drift": ("at_end",), "lag": ("lag",), "sensor_curve": ("bend",), "crosstalk": ("source", "gain"),
+    "drift": ("at_end",), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
+    "sensor_curve": ("bend",), "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "clipping": ("level",), "adc_step": ("step",),
 }  # fmt: skip
-FORMS = SHAPES | OF_CHANNELS
+#: a first-order filter, and the command's speed added to the demanded speed, times a gain
+OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
+FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER
 #: parameters that may be left out: the phase of a wave in time is then another one in each run
 OPTIONAL = {"frequency": ("phase",)}
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
@@ -65,6 +72,8 @@ EACH = "recordings"
 
 def forms_at(place: str) -> list[str]:
     """Forms that a place may have."""
+    if place in CONTROLLER:
+        return list(OF_CONTROLLER)
     if place not in CHANNELS:
         return list(SHAPES)
     quantity, _, phase = place.partition("_")

@@ -40,12 +40,16 @@ class Definite:
 
 @dataclass
 class Normal:
-    """log likelihood -1/2 d'Hd - g'd + const of deviations d from a point; (column,) names."""
+    """log likelihood -1/2 d'Hd - g'd - c/2 of deviations d from a point; (column,) names.
+
+    ``own``: the noise's part of the misfit, which c has not.
+    """
 
     names: list[str]
     H: np.ndarray
     g: np.ndarray
     c: float
+    own: float = 0.0
 
     def __post_init__(self) -> None:
         self.index = {n: k for k, n in enumerate(self.names)}

@@ -1,6 +1,6 @@
 """The fit of a bench: linearise, search, relinearise at what leads, until it stands still."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,8 @@ LINEAR = 0.01  # of what an effect explains, that a linear model may be wrong by
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SETTLING = 3  # steps of a set to its own optimum
-SINGLES = 3  # listed effects that a search may begin at in the place of what leads
+HALVINGS = 6  # of a step after which a set fits worse than before
+SINGLES = 3  # causes that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
@@ -43,6 +44,19 @@ class Fit:
     search: Search
 
 
+@dataclass(frozen=True)
+class Began:
+    """Where a step began: the point, and its misfit (nats) with the noise's part and, where that is known, without."""
+
+    point: dict[str, float]
+    misfits: tuple[float, float | None]
+
+    def holds(self, after: tuple[float, float | None], slack: float) -> bool:
+        """Whether the misfit after the step is no larger."""
+        whole, less = self.misfits
+        return after[1] < less + slack if less is not None and after[1] is not None else after[0] < whole + slack
+
+
 @dataclass
 class Inserted:
     """A fitted set as a model of other recordings: all values, and what stands beside them.
@@ -54,6 +68,11 @@ class Inserted:
     values: dict[str, float]
     beside: dict[str, float]
     own: dict[str, dict[str, float]]
+
+
+def halfway(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+    """The point in the middle of two."""
+    return {n: 0.5 * (one[n] + other[n]) for n in other}
 
 
 class Bench(NormalEquations):
@@ -210,9 +229,26 @@ class Bench(NormalEquations):
         self.describe([better.get(f.id, f) for f in before])
         return self.described != before
 
+    def _by_own_variants(self, model: Model) -> Model:
+        """A set that the point has settled at, with the variant of each unit whose variants look alike near off that is
+        best at its own optimum, where the point moves."""
+        alike = {u.id: u for u in self.units if u.alike}
+        for unit in (alike[u] for u in model.units if u in alike):
+            ends = [(model, dict(self.point), set(self.on))]
+            amount = sum(self.point[p.name] for p in unit.parameters)
+            for v, variant in enumerate(unit.variants):
+                if v in [c.variant for c in model.choices if c.unit == unit.id]:
+                    continue
+                self.point, self.on = dict(ends[0][1]), set(ends[0][2])
+                self.point |= {p.name: p.off for p in unit.parameters} | {p.name: amount for p in variant.parameters}
+                other = tuple(replace(c, variant=v) if c.unit == unit.id else c for c in model.choices)
+                ends.append((self.settle(Model(other, 0.0, 0.0, {}, {})), dict(self.point), set(self.on)))
+            model, self.point, self.on = max(ends, key=lambda e: e[0].log_posterior)
+        return model
+
     def _begun_at_single(self, normal: Normal) -> bool:
-        """Move the point to the best single listed effect where that, at its own optimum, is better than what the
-        linear model has lead; whether it is.
+        """Move the point to the best single cause where that, at its own optimum, is better than what the linear model
+        has lead; whether it is.
 
         A far optimum looks from here like several small effects together.
         """
@@ -220,9 +256,9 @@ class Bench(NormalEquations):
         leading = search.ranked()[0]
         if len(leading.units) < 2:
             return False
-        best: dict[str, Model] = {}  # variant of each effect
+        best: dict[str, Model] = {}  # variant of each
         for m in search.candidates:
-            if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM:
+            if self._kind(m[0]) != "remainder" and m[1] < OTHER_FORM:
                 single = search.fit((m,))
                 if m[0] not in best or single.log_posterior > best[m[0]].log_posterior:
                     best[m[0]] = single
@@ -251,7 +287,7 @@ class Bench(NormalEquations):
             more = remainders and self._carry_own_forms(search)
             if self._ahead(best, normal) < self.settled and not more:
                 break
-            self.settle(best, normal)
+            best = self._by_own_variants(self.settle(best, normal))
             if self._refine(best):
                 self.settle(best)
             # weights are those of the first look at a set: no hypothesis gains by what it leaves
@@ -314,8 +350,11 @@ class Bench(NormalEquations):
         ``normal`` of a model fitted there saves the first step.
         """
         ahead = to_come = np.inf  # log evidence that the last step promised, and that the next one will
+        began: Began | None = None
         if normal is not None:
             begun = dict(self.point), set(self.on)
+            if self.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
+                began = Began(dict(self.point), self._misfits(normal, model, True))
             ahead = to_come = self.move(model, normal)
             if ahead < self.settled:
                 return model
@@ -327,12 +366,44 @@ class Bench(NormalEquations):
             for _ in range(steps):
                 if to_come < enough:
                     break
-                found, at_point = self._fitted(model, corrected)
+                found, at_point, misfits = self._nearer(model, corrected, began)
+                began, ended = Began(dict(self.point), misfits) if self.on <= set(model.units) else None, began
+                if ended is not None and began is not None and ended.point == began.point:
+                    to_come = 0.0
+                    break
                 before, ahead = ahead, self.move(found, at_point)
                 # steps shrink on at least as they did
                 to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
-            to_come = np.inf
+            left, to_come = to_come, np.inf
+        if left > FAR and began is not None:  # what the last steps promised they have not held
+            self.point = dict(began.point)
+            found.log_posterior -= ahead
         return found
+
+    def _nearer(
+        self, model: Model, corrected: bool, began: Began | None
+    ) -> tuple[Model, Normal, tuple[float, float | None]]:
+        """A set fitted at the present point, or nearer to where the last step began if it fits worse here than there,
+        in the end at that point, which is where the point then lies (backtracking; Nocedal and Wright 2006, section
+        3.1); and its misfits there."""
+        for halving in range(HALVINGS + 1):
+            found, at_point = self._fitted(model, corrected)
+            misfits = self._misfits(at_point, found, corrected)
+            if began is None or halving == HALVINGS or began.holds(misfits, self.settled):
+                break
+            last = halving == HALVINGS - 1
+            self.point = dict(began.point) if last else halfway(began.point, self.point)
+        return found, at_point, misfits
+
+    def _misfits(self, normal: Normal, model: Model, corrected: bool) -> tuple[float, float | None]:
+        """Half the squared misfit of a set at the present point (nats), with that of the parameters from their priors,
+        and the same less the noise's part, where it is known.
+
+        Columns beside the point, which the set is linear in, are at their best.
+        """
+        apart = sum((mean / sd) ** 2 for mean, sd, _ in (self.prior(n) for n in normal.names if is_parameter(n)))
+        misfit = 0.5 * float(normal.c + apart) - self.gained_beside(model, normal)
+        return misfit + 0.5 * normal.own, misfit if corrected else None
 
     def _settle_secants(self, model: Model, new: set[str], begun: tuple[dict[str, float], set[str]]) -> Model:
         """A set of which units have just been switched on, at its own optimum, or without them where it was ``begun``,

@@ -242,7 +242,7 @@ def assemble(whites: Sequence[White], names: Sequence[str], aliases: dict[str, s
         c += w.misfit
         if w.noise is not None:
             _add(noise, w.noise, rows, into)
-    return Normal(list(names), *_as_sure(H, g, noise), c)
+    return Normal(list(names), *_as_sure(H, g, noise), c, sum(w.own for w in whites))
 
 
 @compiled

@@ -58,6 +58,12 @@ class Unit:
     variants: Sequence[Variant]
     on: Variant | None = None  # once its own parameters are at a point where it acts
     among: float = 1.0  # alternatives of a form that the prior of its kind is spread over
+    alike: bool = False  # whether its variants look alike near off, and are told apart at their own optima alone
+
+    @property
+    def of_controller(self) -> bool:
+        """Whether it is a form of the controller alone: no evidence for or against what a machine has."""
+        return self.kind == "form" and bool(self.equations) and set(self.equations) <= set(SETTINGS)
 
     @property
     def parameters(self) -> list[Parameter]:

@@ -96,12 +96,13 @@ def read(
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
     nothing = max(0.0, empty + settings)  # what is the controller's alone is no gap of the machine
-    beside = counted or forms or [r for r in remainders if r not in OWN_BUSINESS]
+    of_machine = set(forms) - {u.id for u in units if u.of_controller}
+    beside = counted or of_machine or [r for r in remainders if r not in OWN_BUSINESS]
     if named and not groups:
         verdict = "partly" if beside else "explained"
     elif groups:
         verdict = "partly" if beside else "group"
-    elif forms or (counted and nothing >= 0.5):
+    elif of_machine or (counted and nothing >= 0.5):
         verdict = "described"
     elif nothing >= 0.5:
         verdict = "no_gap"

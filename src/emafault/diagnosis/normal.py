@@ -1,7 +1,9 @@
 """Normal equations of a bench at its point: linearised, assembled, and the step that a set would take."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import repeat
 
 import numpy as np
 
@@ -154,35 +156,69 @@ class NormalEquations(Point):
         mean, sd = (np.array([prior[n][k] for n in free]) for k in (0, 1))
         return marginalise(normal, free, mean, sd, np.array([prior[n][2] for n in normal.names]))
 
-    def nuisance_deviations(
-        self, normal: Normal, given: Mapping[str, float], held: Mapping[str, float] | None = None
-    ) -> dict[str, float]:
-        """Deviations of the nuisances, but for those that are ``held``, where other columns take those given, the rest
-        off."""
-        index, held = normal.index, held or {}
-        free = [x for x in self.nuisances if x not in held]
-        n = np.array([index[x] for x in free], int)
-        rest = [x for x in normal.names if x not in set(free)]
-        d = np.array([held[x] if x in held else given.get(x, self.prior(x)[2]) for x in rest])
+    def nuisance_deviations(self, normal: Normal, given: Mapping[str, float]) -> dict[str, float]:
+        """Deviations of the nuisances where other columns take those given, the rest off."""
+        index = normal.index
+        n = np.array([index[x] for x in self.nuisances], int)
+        rest = [x for x in normal.names if x not in set(self.nuisances)]
+        d = np.array([given.get(x, self.prior(x)[2]) for x in rest])
         r = np.array([index[x] for x in rest], int)
-        mean = np.array([self.prior(x)[0] for x in free])
-        sd = np.array([self.prior(x)[1] for x in free])
+        mean, sd = np.array([self.prior(x)[:2] for x in self.nuisances]).T
         A = normal.H[np.ix_(n, n)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
-        found = Definite(A).solve(right)
-        return dict(zip(free, found.tolist(), strict=True))
+        return dict(zip(self.nuisances, Definite(A).solve(right).tolist(), strict=True))
 
-    def _nuisances_within_reach(self, normal: Normal, given: Mapping[str, float]) -> dict[str, float]:
-        """The same, those that would leave where their prior has any mass held at its end and the others fitted beside
-        them (an active set; Nocedal and Wright 2006, Numerical Optimization, section 16.5)."""
+    def step(self, model: Model, normal: Normal) -> dict[str, float]:
+        """Deviations of the nuisances and of a model's columns at its fit.
+
+        What would leave where its prior has any mass is held at its end, and all others are fitted beside it (an active
+        set; Nocedal and Wright 2006, Numerical Optimization, section 16.5).
+        """
+        ends = self._ends(model)
+        found = self.nuisance_deviations(normal, model.deviations) | model.deviations
         held: dict[str, float] = {}
         while True:
-            found = self.nuisance_deviations(normal, given, held)
-            within = {n: self._within_reach(n, d) for n, d in found.items()}
-            over = {n: within[n] for n, d in found.items() if within[n] != d}
+            within = {n: ends[n](d) if n in ends else self._within_reach(n, d) for n, d in found.items()}
+            over = {n: w for n, w in within.items() if w != found[n] and n not in held}
             if not over:
                 return found | held
             held |= over
+            found = self._beside(model, normal, held) | held
+
+    def _ends(self, model: Model) -> dict[str, Callable[[float], float]]:
+        """By column of a model's units, what keeps its deviation on its side of off and to where its prior has mass."""
+        out: dict[str, Callable[[float], float]] = {n: float for n in model.deviations}
+        units = {u.id: u for u in self.units}
+        for c in (c for c in model.choices if c.unit in units):
+            variant = self.active(units[c.unit])[c.variant % OTHER_FORM]
+            for p, side in zip(variant.parameters, variant.signs or repeat(0), strict=False):
+                if p.secant is None:
+                    out[p.name] = partial(self._on_its_side, p.name, side)
+        return out
+
+    def _on_its_side(self, name: str, side: int, deviation: float) -> float:
+        off = self.prior(name)[2]
+        return self._within_reach(name, side * max(side * deviation, side * off) if side else deviation)
+
+    def _beside(self, model: Model, normal: Normal, held: Mapping[str, float]) -> dict[str, float]:
+        """Deviations of nuisances and of a model's columns beside those that are ``held``."""
+        free = [n for n in (*self.nuisances, *model.deviations) if n not in held]
+        mean = np.array([self.prior(n)[0] for n in free])
+        sd = self.widths(free, model)
+        inside = set(free)
+        rest = [n for n in normal.names if n not in inside]
+        d = np.array([held[n] if n in held else self.prior(n)[2] for n in rest])
+        f, r = (np.array([normal.index[n] for n in names], int) for names in (free, rest))
+        A = normal.H[np.ix_(f, f)] + np.diag(1.0 / sd**2)
+        found = Definite(A).solve(mean / sd**2 - normal.g[f] - normal.H[np.ix_(f, r)] @ d)
+        return dict(zip(free, found.tolist(), strict=True))
+
+    def widths(self, columns: Sequence[str], model: Model) -> np.ndarray:
+        """(column,) standard deviations of the priors that a model's columns have in it, or nuisances have."""
+        width = {c.unit: c.width for c in model.choices}
+        of = {n: c.unit for c in model.choices for n in self.names_of(c)}
+        of |= {n: f"remainder:{n.split('.')[1]}" for n in columns if n.startswith("remainder.")}
+        return np.array([self.prior(n)[1] * width.get(of.get(n, ""), 1.0) for n in columns])
 
     # ---- candidates
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
@@ -268,11 +304,10 @@ class NormalEquations(Point):
         log evidence that the step promises (Newton decrement; Boyd and Vandenberghe 2004, Convex Optimization, section
         9.5.1)
         """
-        given = {n: d for n, d in model.deviations.items()}
-        nuisance = self._nuisances_within_reach(normal, given)
+        given = self.step(model, normal)
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()
-        moved = dict(nuisance)
+        moved = {n: given[n] for n in self.nuisances}
         switched: list[tuple[Unit, Parameter, float]] = []
         for unit in self.units:
             if unit.id not in inside:
@@ -286,7 +321,6 @@ class NormalEquations(Point):
                         d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
             on.add(unit.id)
-        moved = {n: self._within_reach(n, d) for n, d in moved.items()}
         decrement = np.inf if switched else self._decrement(moved, normal)
         found = self.after(moved)
         for unit in self.units:
@@ -304,3 +338,13 @@ class NormalEquations(Point):
         d = np.array([moved[n] for n in names])
         sd = np.array([self.prior(n)[1] for n in names])
         return float(0.5 * (d @ normal.H[np.ix_(k, k)] @ d + np.sum((d / sd) ** 2)))
+
+    def gained_beside(self, model: Model, normal: Normal) -> float:
+        """Log evidence that a model's columns which are no parameters gain at the point (variable projection; Golub and
+        Pereyra 1973, SIAM J. Numer. Anal. 10, 413)."""
+        names = [n for n in model.deviations if not is_parameter(n) and n in normal.index]
+        if not names:
+            return 0.0
+        k = np.array([normal.index[n] for n in names], int)
+        A = normal.H[np.ix_(k, k)] + np.diag(1.0 / self.widths(names, model) ** 2)
+        return 0.5 * float(normal.g[k] @ Definite(A).solve(normal.g[k]))

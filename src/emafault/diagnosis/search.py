@@ -93,6 +93,7 @@ class Search:
         every = [u.kind for u in units]
         listed = sum(k in ("structural", "calibration") for k in every)
         self.counts = listed, len(WORDS), every.count("remainder")
+        self.of_controller = {u.id for u in units if u.of_controller}
         flat = list(candidates.values())
         self.flat = (
             np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
@@ -217,7 +218,8 @@ class Search:
         """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size."""
         kinds = [self.units[u].kind for u, _ in members]
         listed = sum(k in ("structural", "calibration") for k in kinds)
-        forms, left = kinds.count("form"), kinds.count("remainder")
+        controls = sum(u in self.of_controller for u, _ in members)
+        forms, left = kinds.count("form") - controls, kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
         own = [u for u, v in members if v >= OTHER_FORM]
         if listed >= len(self.size_prior) or forms >= len(FORM_PRIOR):
@@ -227,6 +229,7 @@ class Search:
         value -= sum(np.log(self.units[u].among) for u, _ in members)
         value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
         value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)
+        left, n_left = left + controls, n_left + len(self.of_controller)
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search

@@ -1,14 +1,22 @@
-"""Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk, curves."""
+"""Faults of the measuring chain, as terms on the recorded signals: lag between channels, drift, crosstalk, curves.
+
+A channel that lags records (1 - lag) x[n] + lag x[n - 1] of a true signal x. One that smooths by a memory m, as a
+logger may, records y with y[n] + m (y[n] - y[n - 1]) = x[n]. One behind an analogue first-order filter of time constant
+T has y + T dy/dt = x, of which the mean over an interval is exact where the filtered signal at its ends is recorded.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
+from ..first_order import LEAST, filtered, smoothed
 from .dual import Dual, Number
 from .point import Point, effect_name
 from .signals import Signals
 from .terms import with_hook
+
+STEP = 1e-4  # interval, of a difference by them
 
 
 def delayed(x: np.ndarray) -> np.ndarray:
@@ -28,16 +36,33 @@ def advanced(x: np.ndarray) -> np.ndarray:
 
 
 def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
-    """What is recorded of a true signal on a channel that lags (in intervals, either sign)."""
+    """What is recorded of a true signal on a channel that lags (in intervals, either sign), smooths or filters."""
     late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
     out = x
     if late.slopes or late.value:
         out = out + late * _changed(x, delayed, late, size)
     if early.slopes or early.value:
         out = out + early * _changed(x, advanced, early, size)
+    for of, operate in (("smoothed", smoothed), ("filtered", filtered)):
+        amount = p(f"lag.{channel}_{of}")
+        if amount.slopes or amount.value > LEAST:
+            out = through(out, operate, amount, size)
     skew = p(f"skew.{channel}@{p.recording}")
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
+    return out
+
+
+def through(x: Dual, operate: Callable[[np.ndarray, float], np.ndarray], amount: Dual, size: int) -> Dual:
+    """A signal through a filter, with its derivative by the filter's constant (in intervals)."""
+    at = float(amount.value)
+    if at <= LEAST:
+        return x + amount.through(0.0, delayed(np.asarray(x.value)))
+    plain = np.asarray(x.value)
+    out = x.linear(lambda z: operate(z, at), size)
+    if amount.slopes:
+        by_constant = (operate(plain, at + STEP) - np.asarray(out.value)) / STEP
+        out = out + amount.through(0.0, by_constant)
     return out
 
 
@@ -46,19 +71,36 @@ def _changed(x: Dual, operate: Callable[[np.ndarray], np.ndarray], lag: Dual, si
     return x.linear(operate, size) if lag.value else Dual(x.value).linear(operate, size)
 
 
-def undone(p: Point, channel: str, x: np.ndarray | Dual, size: int) -> Dual:
-    """The true signal from one recorded on a channel that lags."""
-    late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
-    out = x if isinstance(x, Dual) else Dual(x)
-    plain = np.asarray(out.value)
+def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray) -> Dual:
+    """The true signal from one recorded on a channel that lags, smooths or filters.
+
+    ``rate``: change of the recorded signal over an interval, of what is a mean over it from its start to its end.
+    """
+    late, early, smooth, constant = (p(f"lag.{channel}_{of}") for of in ("late", "early", "smoothed", "filtered"))
+    out = Dual(x)
     if late.slopes or late.value:
-        out = out + late * advanced(plain)
+        out = out + late * advanced(x)
     if early.slopes or early.value:
-        out = out + early * delayed(plain)
+        out = out + early * delayed(x)
+    if smooth.slopes or smooth.value:
+        out = out - smooth * delayed(x)
+    if constant.slopes or constant.value:
+        out = out + constant * rate
     skew = p(f"skew.{channel}@{p.recording}")
     if skew.slopes or skew.value:
-        out = out + skew * (0.5 * (advanced(plain) - delayed(plain)))
+        out = out + skew * (0.5 * (advanced(x) - delayed(x)))
     return out
+
+
+def rates(mean: np.ndarray, at_end: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Change of a signal over an interval, (sample,): from its start to its end, and at the rate it has at the end, of
+    the parabolas that have the means and ends recorded on both sides of it; of the means alone where there are no
+    ends."""
+    if at_end is None:
+        return 0.5 * (advanced(mean) - delayed(mean)), advanced(mean)
+    there = 3.0 * advanced(mean)
+    there[1:-1] -= at_end[2:] - at_end[:-2]
+    return -delayed(at_end), there
 
 
 def full_range(actuator: ActuatorParameters, channel: str) -> float:
@@ -120,9 +162,10 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     if at_end is None:
         following = np.vstack([rec.current[1:], rec.current[-1:]])
         at_end = 0.5 * (rec.current + following)
-    for source, out in ((rec.current, means), (at_end, ends)):
+    rate = [rates(rec.current[:, j], None if rec.current_end is None else rec.current_end[:, j]) for j in range(3)]
+    for n, (source, out) in enumerate(((rec.current, means), (at_end, ends))):
         for j in range(3):
-            i = undone(p, "current", source[:, j], rec.size)
+            i = undone(p, "current", source[:, j], rate[j][n])
             drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
             i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
             i = i - drift * share

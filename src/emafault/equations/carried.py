@@ -4,7 +4,7 @@ What cannot be an entry is None: an undescribed remainder, spikes, whose size is
 bus that changes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,13 @@ DRIVERS: dict[str, tuple[str, ...]] = {
     "position": ("output", "output_play", "output_twist"),
     "bus": ("bus_voltage",),
 }  # fmt: skip
+#: what a controller does with its command, of a size
+CONTROLLER: dict[str, Callable[[float], Entry]] = {
+    "filter": lambda x: {"form": "command_filter", "time_constant": x},
+    "feedforward": lambda x: {"form": "feedforward", "gain": x},
+}
+#: how a channel comes late -> form
+SMOOTH = {"smoothed": "smoothing", "filtered": "low_pass"}
 
 
 def of_form(
@@ -80,14 +87,20 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     kind, _, channel = unit.removeprefix("~").partition("_")
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
-        lag = sum(-v if name.endswith("_early") else v for name, v in values.items())
-        return _rounded({"place": channel, "form": "lag", "lag": lag})
+        ((name, amount),) = values.items()
+        way = name.rpartition("_")[2]
+        if way in SMOOTH:
+            return _rounded({"place": channel, "form": SMOOTH[way], "delay": amount})
+        return _rounded({"place": channel, "form": "lag", "lag": -amount if way == "early" else amount})
     if kind == "crosstalk":
         ((pair, gain),) = values.items()
         return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})
     if kind == "curve":
         ((place, bend),) = values.items()
         return _rounded({"place": place, "form": "sensor_curve", "bend": bend})
+    if kind == "controller":
+        ((_, amount),) = values.items()
+        return _rounded({"place": "command", **CONTROLLER[channel](amount)})
     if kind == "drift":
         own = {name.partition("@")[2]: {"at_end": v} for name, v in values.items()}
         mean = float(np.mean([v["at_end"] for v in own.values()]))

@@ -1,6 +1,7 @@
 """The current that flows against the current that the controller asks for; gains and limits are the controller's own.
 
-Everything that the controller sees is recorded: command, output position, speed. Half the sum of the absolute phase
+Everything that the controller sees is recorded: command, output position, speed. Its command may pass a filter, and the
+command's speed may be fed forward to the demanded speed. Half the sum of the absolute phase
 currents is the largest of them, and the pair's current but for what a commutation adds to it. Rows are means over
 ``BLOCK`` and differenced, which takes the random walk out that the integral makes of the sensors' noise.
 """
@@ -9,7 +10,9 @@ import numpy as np
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.commands import with_corners
+from ..first_order import filtered
 from . import commutation, position
+from .acquisition import through
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -41,7 +44,10 @@ def residual(state: State) -> Dual:
     seen = model + Dual(np.sign(beyond.value) * more, beyond.kept(more > 0.0).slopes)
     commanded = rec.once(("commanded",), lambda: _commanded(rec, lead))
     at_ticks = output.linear(lambda x: _at_ticks(x, h, lead), rec.size)
-    wanted = p("controller.position_gain") * (a.gear_ratio * (commanded - at_ticks))
+    constant = p("command.filter") * (1.0 / h)
+    seen_command = through(Dual(commanded), filtered, constant, rec.size)
+    wanted = p("controller.position_gain") * (a.gear_ratio * (seen_command - at_ticks))
+    wanted = wanted + p("command.feedforward") * (a.gear_ratio * rec.once(("command_rate",), lambda: _rate(rec, lead)))
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
     error = asked - seen.linear(lambda x: _centred(x, h, lead), rec.size)
@@ -163,6 +169,11 @@ def _commanded(rec, lead: float) -> np.ndarray:
     times, positions = with_corners(ends, rec.command)
     first = rec.command[0] - (rec.command[1] - rec.command[0])
     return np.interp(rec.time - lead, np.concatenate([[0.0], times]), np.concatenate([[first], positions]))
+
+
+def _rate(rec, lead: float) -> np.ndarray:
+    """(sample,) speed of the command (rad/s)."""
+    return np.gradient(rec.once(("commanded",), lambda: _commanded(rec, lead)), rec.interval)
 
 
 def _at_ticks(x: np.ndarray, h: float, lead: float) -> np.ndarray:

@@ -11,8 +11,9 @@ from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
-from .acquisition import advanced, delayed, full_range
+from .acquisition import full_range, rates, undone
 from .diagnose import Diagnosed
+from .point import Point
 
 Undo = Callable[[Recording], Recording]
 #: forms that a voltage of one phase has from its channel: nothing in the machine makes them
@@ -50,8 +51,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             yield words, partial(_less, channel=channel, x=x)
     for quantity in ("voltage", "current", "output"):
         if f"~lag_{quantity}" in told:
-            late, early = (values.get(f"lag.{quantity}_{side}", 0.0) for side in ("late", "early"))
-            yield f"lag of the {quantity} channel", partial(_shifted, quantity=quantity, late=late, early=early)
+            yield f"lag of the {quantity} channel", partial(_not_late, quantity=quantity, at=Point(values, name, ()))
     for quantity in ("voltage", "current"):
         if f"~curve_{quantity}" in told:
             bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
@@ -109,15 +109,19 @@ def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
     )
 
 
-def _shifted(recording: Recording, quantity: str, late: float, early: float) -> Recording:
-    def undone(x: np.ndarray) -> np.ndarray:
-        return np.apply_along_axis(lambda c: c + late * advanced(c) + early * delayed(c), 0, x)
+def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
+    def of(mean: np.ndarray, end: np.ndarray | None = None) -> list[np.ndarray]:
+        known = [x for x in (mean, end) if x is not None]
+        return [np.asarray(undone(at, quantity, x, r).value) for x, r in zip(known, rates(mean, end), strict=False)]
 
-    if quantity == "current":
-        return _currents(recording, undone)
+    if quantity == "output":
+        return replace(recording, output_position=of(recording.output_position)[0])
     if quantity == "voltage":
-        return replace(recording, phase_voltage=undone(recording.phase_voltage))
-    return replace(recording, output_position=undone(recording.output_position))
+        return replace(recording, phase_voltage=np.column_stack([of(x)[0] for x in recording.phase_voltage.T]))
+    ends = recording.phase_current_end
+    phases = [of(x, None if ends is None else ends[:, j]) for j, x in enumerate(recording.phase_current.T)]
+    means, *at_end = (np.column_stack(x) for x in zip(*phases, strict=True))
+    return replace(recording, phase_current=means, phase_current_end=at_end[0] if at_end else None)
 
 
 def _without_crosstalk(recording: Recording, gains: np.ndarray) -> Recording:

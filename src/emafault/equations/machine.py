@@ -12,7 +12,7 @@ from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
-from .parameters import internal, measuring_chain, nuisances, unit_of
+from .parameters import controller, internal, measuring_chain, nuisances, unit_of
 from .point import Point, State
 from .signals import Signals
 
@@ -62,7 +62,7 @@ class ReferenceActuator:
         self.units = [
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
-        self.units += measuring_chain(list(self.recordings))
+        self.units += [*measuring_chain(list(self.recordings)), *controller(actuator)]
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)

@@ -21,6 +21,7 @@ SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings hav
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
+MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
@@ -130,12 +131,19 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
 def measuring_chain(recordings: Collection[str]) -> list[Unit]:
     """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drift."""
     out = []
-    for channel in ("voltage", "current", "output"):  # the speed's is in the catalogue
+    for channel in ("voltage", "current", "output", "speed"):
+        # that the speed's comes late is in the catalogue
+        ways = ("late", "early", "smoothed", "filtered") if channel != "speed" else ("early",)
         variants = [
-            Variant([Parameter(f"lag.{channel}_{side}", 0.0, 0.0, 1.0, "interval")], [1], LEAST_LAG)
-            for side in ("late", "early")
+            Variant(
+                [Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")],
+                [1],
+                LEAST_LAG,
+                [LEAST_LAG] if way in MADE else (),
+            )
+            for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
+        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=4.0, alike=len(ways) > 1))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
@@ -150,6 +158,16 @@ def measuring_chain(recordings: Collection[str]) -> list[Unit]:
             drift = Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0)
             out.append(drift)
     return out
+
+
+def controller(a: ActuatorParameters) -> list[Unit]:
+    """What a controller may do that the nominal one does not: filter its command, feed the command's speed forward."""
+    loop = 1.0 / a.position_gain  # s, of the position's loop
+    of = {
+        "filter": Parameter("command.filter", 0.0, 0.0, loop, "s"),
+        "feedforward": Parameter("command.feedforward", 0.0, 0.0, 1.0, "1"),
+    }
+    return [Unit(f"~controller_{name}", "form", ("control",), [Variant([p], [1])]) for name, p in of.items()]
 
 
 def _fault(full: str, component: str) -> Parameter:

@@ -16,6 +16,14 @@ EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
 APART = 3.0  # standard deviations from nominal at which a controller's gain is told as different
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
+LATE = {
+    "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
+    "filtered": "is behind a first-order filter with a time constant of {}",
+}  # fmt: skip
+CONTROLLER = {
+    "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
+    "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
+}
 WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
 
@@ -116,7 +124,8 @@ def told_of_chain(
     units: Mapping[str, str],
     actuator: ActuatorParameters,
 ) -> dict[str, Any]:
-    """The same of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve."""
+    """The same of a fault of the measuring chain that has parameters of its own (lag, crosstalk, drift, curve), and of
+    what a controller does beside its gains."""
     kind, _, channel = unit.removeprefix("~").partition("_")
     name = channel.replace("_", " of phase ")
     said = {n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]} for n, (v, sd) in linear.items()}
@@ -132,9 +141,20 @@ def told_of_chain(
             "equation": equation, "along": "current" if channel == "current" else "time", "form": "sensor_curve",
             "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {bends}.",
         }  # fmt: skip
+    if kind == "controller":
+        ((amount, _),) = linear.values()
+        return {
+            "equation": equation, "along": "time", "form": kind, "parameters": said,
+            "sentence": f"In the control equation: {CONTROLLER[channel].format(amount)}.",
+        }  # fmt: skip
+    says = f"{kind} of the {name} channel"
+    if kind == "lag":
+        ((at, (amount, _)),) = linear.items()
+        says = f"the {'output position' if name == 'output' else name} channel {LATE[at.rpartition('_')[2]]}"
+        says = says.format(f"{amount:.2g} intervals")
     return {
         "equation": equation, "along": "time", "form": kind, "parameters": said,
-        "sentence": f"In the measuring chain: {kind} of the {name} channel.",
+        "sentence": f"In the measuring chain: {says}.",
     }  # fmt: skip
 
 

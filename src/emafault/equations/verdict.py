@@ -232,6 +232,8 @@ def _controller(fitted: Fitted) -> dict[str, dict]:
     bench, fit, values = fitted.bench, fitted.fit, fitted.values
     index = fit.normal.index
     n = [x for x in bench.nuisances if x.startswith("controller.")]
+    beside = [u for u in bench.units if u.id in fitted.reading.forms and u.of_controller]
+    n += [p.name for u in beside for p in u.parameters if p.name in index]
     if "remainder:control" in fitted.reading.remainders:  # which may stand in for a gain
         n += [x for x in index if x.startswith("remainder.control.")]
     k = np.array([index[x] for x in n])

@@ -2,7 +2,7 @@
 
 from ..diagnosis.described import Described
 from .point import SEEDED
-from .telling import bare
+from .telling import LATE, bare
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
@@ -100,18 +100,24 @@ def _of_group(group: str, short: str) -> str:
             _, phase, way = short.split("_", 2)
             return f"commutation time, deviation of phase {phase}: {_PASSING[way]}"
         return CONTROLLER.get(short, short)
+    if group == "command":
+        return {"filter": "filter of the command", "feedforward": "feed-forward of the command's speed"}[short]
     channel, _, side = short.partition("_")
     chain = {
         "skew": f"{short} channel is sampled late by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
-        "lag": f"{'output position' if channel == 'output' else channel} channel comes {side} by",
+        "lag": f"{'output position' if channel == 'output' else channel} channel {_late(side)}",
         "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "drift_current": f"drift of the current channel of phase {short}",
         "drift_voltage": f"drift of the voltage channel of phase {short}",
     }
     return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
+
+
+def _late(way: str) -> str:
+    return LATE.get(way, way).removesuffix(" {}")
 
 
 def of_form(form: Described, what: str, name: str) -> str:

@@ -164,7 +164,8 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
     listed = [u for u, k in kinds.items() if k in LISTED]
     chosen = [
         *rng.choice(listed, rng.choice(len(SIZE_PRIOR), p=SIZE_PRIOR), replace=False),
-        *_drawn_forms([u for u in bench.units if u.kind == "form"], rng),
+        *_drawn_forms([u for u in bench.units if u.kind == "form" and not u.of_controller], rng),
+        *(u.id for u in bench.units if u.of_controller and rng.random() < REMAINDER_PRIOR),
         *(u for u, k in kinds.items() if k == "remainder" and rng.random() < REMAINDER_PRIOR),
     ]
     d = bench.fixed.copy()
@@ -179,7 +180,7 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
         c = bench.candidates[m]
         members[m] = float(rng.choice(c.widths))
         k = bench.rest[c.index]
-        held = np.array([bench.tolerance[int(q)] for q in k]) if c.hole.size else np.zeros(0, int)
+        held = np.array([bench.tolerance[q] for q in k.tolist() if c.hole.size and q in bench.tolerance], int)
         position = np.searchsorted(bench.n, held, sorter=np.argsort(bench.n))
         position = np.argsort(bench.n)[position] if len(held) else position
         while True:
@@ -207,9 +208,8 @@ def _allowed(bench: LinearBench, c: Candidate, d: np.ndarray) -> np.ndarray:
     apart = d[:, k] - bench.fixed[k]
     good = np.all((c.signs == 0) | (apart * c.signs >= 0.0), axis=1)
     if c.hole.size:
-        held = [bench.tolerance[int(q)] for q in k]
         low, high = c.hole * c.sd
-        off = apart + d[:, held]
+        off = apart + np.column_stack([d[:, bench.tolerance[q]] if q in bench.tolerance else 0.0 * d[:, q] for q in k])
         good &= np.any((off <= low) | (off >= high), axis=1)
     return good
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...first_order import followed
+from ...first_order import filtered
 
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
@@ -10,22 +10,12 @@ SHORTEST = 1e-6  # s
 FADED, LONGEST = 1e-4, 500  # of a response: what is left at its end, and intervals that it has at most
 
 
-def filtered(w, interval, tau):
-    """Means over the intervals of a first-order filter's output, its input constant within each."""
-    if tau < SHORTEST:
-        return w
-    decay = np.exp(-interval / tau)
-    state = followed(w, 1.0 - decay, decay)
-    before = np.concatenate([[0.0], state[:-1]])
-    return w + (before - w) * (tau / interval) * (1.0 - decay)
-
-
 def response(p, rec):
     """Recorded speed after one interval's speed of one, in that interval and those that follow."""
     tau, h = max(p("tau").value, 0.0), rec.interval
-    impulse = np.zeros(min(int(-np.log(FADED) * tau / h) + 3, LONGEST))
-    impulse[0] = 1.0
-    return filtered(impulse, h, tau)
+    impulse = np.zeros(min(int(-np.log(FADED) * tau / h) + 4, LONGEST))
+    impulse[1] = 1.0
+    return filtered(impulse, tau / h)[1:]
 
 
 def speed(p, rec, w):
@@ -33,7 +23,7 @@ def speed(p, rec, w):
     tau = p("tau")
     at, h = max(tau.value, 0.0), rec.interval
     if not tau.slopes:
-        return w if at < SHORTEST else w.linear(lambda x: filtered(x, h, at), rec.size)
+        return w if at < SHORTEST else w.linear(lambda x: filtered(x, at / h), rec.size)
     step = 1e-5
-    slope = (filtered(w.value, h, at + step) - filtered(w.value, h, at)) / step
-    return w.linear(lambda x: filtered(x, h, at), rec.size) + tau.through(0.0, slope)
+    slope = (filtered(w.value, (at + step) / h) - filtered(w.value, at / h)) / step
+    return w.linear(lambda x: filtered(x, at / h), rec.size) + tau.through(0.0, slope)
