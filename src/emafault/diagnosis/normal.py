@@ -171,8 +171,9 @@ class NormalEquations(Point):
     def step(self, model: Model, normal: Normal) -> dict[str, float]:
         """Deviations of the nuisances and of a model's columns at its fit.
 
-        What would leave where its prior has any mass is held at its end, and all others are fitted beside it (an active
-        set; Nocedal and Wright 2006, Numerical Optimization, section 16.5).
+        A nuisance that would leave where its prior has any mass is held at its end, what has one side of off is held
+        there, and all others are fitted beside it (an active set; Nocedal and Wright 2006, Numerical Optimization,
+        section 16.5).
         """
         ends = self._ends(model)
         found = self.nuisance_deviations(normal, model.deviations) | model.deviations
@@ -186,7 +187,7 @@ class NormalEquations(Point):
             found = self._beside(model, normal, held) | held
 
     def _ends(self, model: Model) -> dict[str, Callable[[float], float]]:
-        """By column of a model's units, what keeps its deviation on its side of off and to where its prior has mass."""
+        """By column of a model's units, what keeps its deviation on its side of off."""
         out: dict[str, Callable[[float], float]] = {n: float for n in model.deviations}
         units = {u.id: u for u in self.units}
         for c in (c for c in model.choices if c.unit in units):
@@ -197,8 +198,7 @@ class NormalEquations(Point):
         return out
 
     def _on_its_side(self, name: str, side: int, deviation: float) -> float:
-        off = self.prior(name)[2]
-        return self._within_reach(name, side * max(side * deviation, side * off) if side else deviation)
+        return side * max(side * deviation, side * self.prior(name)[2]) if side else deviation
 
     def _beside(self, model: Model, normal: Normal, held: Mapping[str, float]) -> dict[str, float]:
         """Deviations of nuisances and of a model's columns beside those that are ``held``."""
