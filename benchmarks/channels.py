@@ -1,5 +1,5 @@
-"""Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's or filtered, or whose
-controller does more with its command.
+"""Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's, filtered or computed of
+duty cycles, or whose controller does more with its command.
 
     python benchmarks/channels.py [--only "encoder of 4096 counts" ...]
 
@@ -23,7 +23,7 @@ EFFECTS = {
     "stribeck": ("effects.stribeck.a=0.02",),
 }  # fmt: skip
 SPEC = config.diagnosis_spec(config.compose())
-THEMSELVES = ("adc_step", "lag", "controller")
+THEMSELVES = ("adc_step", "lag", "sensor_curve", "controller")
 TRUE = {"sensors' filter of 5 kHz": ("speed_latency",)}  # what a channel is, of the listed effects
 NOISY = ("voltage", "current", "current_end", "speed", "angle", "position")
 
@@ -58,6 +58,7 @@ CHANNELS = {
     "angle's noise ten times": noisier(10.0, "angle"),
     "currents smoothed": entry("current", "smoothing", delay=0.4),
     "voltages smoothed": entry("voltage", "smoothing", delay=0.4),
+    "voltages of duty cycles": entry("voltage", "drop", drop=0.7, turn=0.1),
     "sensors' filter of 5 kHz": ("recording.filter={kind: first_order, cutoff: 5000, before_noise: true}",),
     "filter of the command": entry("command", "command_filter", time_constant=0.005),
     "feed-forward": entry("command", "feedforward", gain=0.5),

@@ -78,6 +78,10 @@ def test_channels_faults(true):
     np.testing.assert_allclose((true["rotor_speed"][0] - passed)[at].mean(), 3.0 * rate[at].mean(), rtol=0.1)
     bent = changed(true, place="voltage", form="sensor_curve", bend=0.05)["phase_voltage"]
     np.testing.assert_allclose(bent, -0.05 * v * (v / 24.0) ** 2, atol=1e-12)
+    less = changed(true, place="voltage", form="drop", drop=0.7, turn=0.05)["phase_voltage"]
+    np.testing.assert_allclose(less, 0.7 * np.tanh(i / 0.05), atol=1e-12)
+    one = changed(true, place="voltage_b", form="drop", drop=0.7, turn=0.05)["phase_voltage"]
+    np.testing.assert_allclose(one, less * [0.0, 1.0, 0.0], atol=1e-12)
     drift = changed(true, place="current_c", form="drift", at_end=0.2)["phase_current"][:, 2]
     np.testing.assert_allclose(drift, 0.2 * (np.arange(1000) + 0.5) / 1000, atol=1e-12)
 
@@ -93,7 +97,8 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "drift", "clipping", "adc_step", "held", "spikes"
+        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "drop", "drift", "clipping", "adc_step", "held",
+        "spikes",
     }  # fmt: skip
 
 

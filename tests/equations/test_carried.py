@@ -138,6 +138,11 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
         ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
         ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
         (
+            "~drop_voltage",
+            {"drop.voltage_b": 0.4, "drop.turn": 0.1},
+            {"place": "voltage_b", "form": "drop", "drop": 0.4, "turn": 0.1},
+        ),
+        (
             "~drift_current_b",
             {"drift_current.b@one.nc": 0.1, "drift_current.b@two.nc": 0.3},
             {

@@ -201,6 +201,25 @@ def test_a_bent_curve_of_the_voltages_is_told_and_undone(tmp_path):
         assert np.std(got.phase_voltage - r.phase_voltage) < 0.1 * np.std(faulty[name].phase_voltage - r.phase_voltage)
 
 
+def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
+    true = bench(COGGING)
+    of_duty = {
+        n: replace(r, phase_voltage=r.phase_voltage + 0.6 * np.clip(r.phase_current / 0.2, -1.0, 1.0))
+        for n, r in true.items()
+    }
+    names = list(of_duty)
+    found = diagnose("bench", of_duty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["form"], told["equation"], told["along"]) == ("sensor_curve", "sensor_voltage", "current")
+    assert told["parameters"]["drop"]["value"] == pytest.approx(0.6, rel=0.05)
+    assert "duty cycles" in told["sentence"] and told["term"]["form"] == "drop"
+    assert "drop of the switches" in write_corrected(found, of_duty, tmp_path / "bench", tmp_path / "new")
+    for name, r in true.items():
+        got = read_recording(tmp_path / "new" / name)
+        assert np.std(got.phase_voltage - r.phase_voltage) < 0.1 * np.std(of_duty[name].phase_voltage - r.phase_voltage)
+
+
 def test_samples_that_clip_are_left_out_and_told(cogging):
     clipped = {}
     for name, r in bench(COGGING).items():

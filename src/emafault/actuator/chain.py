@@ -1,7 +1,7 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
-Order: what a shape adds to a channel, the channel's curve, crosstalk, lag or filter, and drift; the sensors' noise;
-then spikes, held samples, clipping and the converter's steps.
+Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
+filter, and drift; the sensors' noise; then spikes, held samples, clipping and the converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..first_order import filtered, smoothed
+from ..switches import direction
 from .grammar import CONTROLLER, FACTORS, MACHINE, PHASES, SHAPES, of_recording
 from .motor import AXIS, trapezoid
 from .unlisted import PLACES, drawn_phase, followed, row_of
@@ -23,7 +24,7 @@ RECORDED = {
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
 AFTER_NOISE = ("spikes", "held", "clipping", "adc_step")
-ORDER = ("", "sensor_curve", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
+ORDER = ("", "sensor_curve", "drop", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 
@@ -62,6 +63,9 @@ class Chain:
                 source = f"current_{entry['source']}"
                 for x, y in zip(_channels(signals, entry["place"]), _channels(true, source), strict=True):
                     x += entry["gain"] * y
+            elif entry["form"] == "drop":
+                (x,), (i, *_) = _channels(signals, entry["place"]), _channels(true, f"current{entry['place'][7:]}")
+                x += entry["drop"] * direction(i, entry["turn"])
             elif entry["form"] not in AFTER_NOISE:
                 for x in _channels(signals, entry["place"]):
                     self._change(x, entry)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from ..first_order import LEAST, filtered, smoothed
+from ..switches import direction, turning
 from .dual import Dual, Number
 from .point import Point, effect_name
 from .signals import Signals
@@ -121,6 +122,21 @@ def bent(p: Point, channel: str, phase: str, x: Dual | np.ndarray, actuator: Act
         if bend.slopes or bend.value:
             cubic = plain * np.square(plain / full) if cubic is None else cubic
             out = out + bend * cubic
+    return out
+
+
+def dropped(p: Point, phase: str, current: np.ndarray) -> Dual:
+    """What a voltage (V) of duty cycles has too much: it knows nothing of the drop of the switches and of their dead
+    time, which goes with the current's direction.
+
+    All phases have it alike, or one its own.
+    """
+    out, turn = Dual(0.0), p("drop.turn")
+    at = float(turn.value)
+    for name in ("drop.voltage", f"drop.voltage_{phase}"):
+        drop = p(name)
+        if drop.slopes or drop.value:
+            out = out + drop * turn.through(direction(current, at), turning(current, at))
     return out
 
 

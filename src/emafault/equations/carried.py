@@ -83,7 +83,7 @@ def of_form(
 
 
 def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | None:
-    """Entry of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve."""
+    """Entry of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve, drop."""
     kind, _, channel = unit.removeprefix("~").partition("_")
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
@@ -98,6 +98,9 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     if kind == "curve":
         ((place, bend),) = values.items()
         return _rounded({"place": place, "form": "sensor_curve", "bend": bend})
+    if kind == "drop":
+        ((place, drop),) = ((n, v) for n, v in values.items() if n != "turn")
+        return _rounded({"place": place, "form": "drop", "drop": drop, "turn": values["turn"]})
     if kind == "controller":
         ((_, amount),) = values.items()
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})

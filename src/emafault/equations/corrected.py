@@ -11,6 +11,7 @@ from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
+from ..switches import direction
 from .acquisition import full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
@@ -23,7 +24,7 @@ OF_THE_CHANNEL = ("frequency", "step_change")
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
     """The recordings less the faults of their measuring chain, and what has been undone.
 
-    Lag, curve, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are
+    Lag, curve, drop, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are
     replaced by the mean of their neighbours. What cannot be undone (held samples, converter steps, clipping) stays.
     """
     out, undone = {}, dict[str, None]()
@@ -57,6 +58,9 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
             full = full_range(found.bench.machine.actuator, quantity)
             yield f"curve of the {quantity} channels", partial(_straightened, quantity=quantity, bends=bends / full**2)
+    if "~drop_voltage" in told:
+        drops = np.array([sum(values.get(f"drop.{c}", 0.0) for c in ("voltage", f"voltage_{j}")) for j in "abc"])
+        yield "drop of the switches", partial(_less_drop, drops=drops, turn=values["drop.turn"])
     if "~crosstalk_current" in told:
         gains = np.array([[values.get(f"crosstalk.{j}{q}", 0.0) if j != q else 0.0 for q in "abc"] for j in "abc"])
         yield "crosstalk between the currents", partial(_without_crosstalk, gains=gains)
@@ -89,6 +93,12 @@ def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Rec
     names = ("phase_voltage",) if quantity == "voltage" else ("phase_current", "phase_current_end")
     old = {n: x for n in names if (x := getattr(recording, n)) is not None}
     return replace(recording, **{n: x + bends * x**3 for n, x in old.items()})
+
+
+def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recording:
+    """``drops`` (phase,) what the voltages have too much (V)."""
+    too_much = drops * direction(recording.phase_current, turn)
+    return replace(recording, phase_voltage=recording.phase_voltage - too_much)
 
 
 def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:

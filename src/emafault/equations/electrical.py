@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from .acquisition import bent, recorded_late
+from .acquisition import bent, dropped, recorded_late
 from .commutation import EDGE, LONGEST, REACH, rows_of, sweep
 from .dual import Dual, value_of
 from .point import State, effect_name
@@ -76,12 +76,14 @@ def residuals(state: State) -> dict[str, Dual]:
 
 
 def recorded(state: State, true: list[Dual]) -> list[Dual]:
-    """What is recorded of the true voltages: lag, gains, the star point, then the channels' curves."""
-    p = state.p
+    """What is recorded of the true voltages: lag, gains, the star point, the channels' curves, the switches' drop."""
+    p, rec, a = state.p, state.rec, state.rec.actuator
     true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
-    return [v - bent(p, "voltage", "abc"[j], v, state.rec.actuator) for j, v in enumerate(true)]
+    bends = [bent(p, "voltage", j, v, a) for j, v in zip("abc", true, strict=True)]
+    drops = [dropped(p, j, i) for j, i in zip("abc", rec.current.T, strict=True)]
+    return [v - bend + drop for v, bend, drop in zip(true, bends, drops, strict=True)]
 
 
 def usable(state: State, j: int) -> np.ndarray:

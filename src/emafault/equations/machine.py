@@ -62,7 +62,7 @@ class ReferenceActuator:
         self.units = [
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
-        self.units += [*measuring_chain(list(self.recordings)), *controller(actuator)]
+        self.units += [*measuring_chain(actuator, list(self.recordings)), *controller(actuator)]
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)

@@ -9,6 +9,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import TOLERANCES, Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
+from ..switches import TURN
 from . import commutation, position
 from .point import SEEDED
 from .signals import REST, Signals
@@ -23,6 +24,7 @@ TIMING = 0.5  # of a control period, by which samples and means within it may be
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
+DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -128,8 +130,8 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
     return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
 
 
-def measuring_chain(recordings: Collection[str]) -> list[Unit]:
-    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drift."""
+def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[Unit]:
+    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift."""
     out = []
     for channel in ("voltage", "current", "output", "speed"):
         # that the speed's comes late is in the catalogue
@@ -148,10 +150,14 @@ def measuring_chain(recordings: Collection[str]) -> list[Unit]:
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
     out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
-    for channel in ("voltage", "current"):
+    at = TURN * a.current_limit
+    turn = Parameter("drop.turn", at, at, at, "A", vanishes=0.0)
+    curves = {"curve": (BEND, "1"), "drop": (DROP * a.bus_voltage, "V")}
+    for kind, channel in (("curve", "voltage"), ("curve", "current"), ("drop", "voltage")):
         of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
-        variants = [Variant([Parameter(f"curve.{c}", 0.0, 0.0, BEND, "1")]) for c in of]
-        out.append(Unit(f"~curve_{channel}", "form", (f"sensor_{channel}",), variants, among=2.0))
+        also = [turn] if kind == "drop" else []
+        variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
+        out.append(Unit(f"~{kind}_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
     for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
         for j in PER_PHASE:
             parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]

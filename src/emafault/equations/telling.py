@@ -124,8 +124,8 @@ def told_of_chain(
     units: Mapping[str, str],
     actuator: ActuatorParameters,
 ) -> dict[str, Any]:
-    """The same of a fault of the measuring chain that has parameters of its own (lag, crosstalk, drift, curve), and of
-    what a controller does beside its gains."""
+    """The same of a fault of the measuring chain that has parameters of its own (lag, crosstalk, drift, curve, drop),
+    and of what a controller does beside its gains."""
     kind, _, channel = unit.removeprefix("~").partition("_")
     name = channel.replace("_", " of phase ")
     said = {n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]} for n, (v, sd) in linear.items()}
@@ -140,6 +140,16 @@ def told_of_chain(
         return {
             "equation": equation, "along": "current" if channel == "current" else "time", "form": "sensor_curve",
             "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {bends}.",
+        }  # fmt: skip
+    if kind == "drop":
+        ((at, drop),) = ((n, v) for n, v in said.items() if n != "drop.turn")
+        phase = at.partition("_")[2]
+        which = f"voltage of phase {phase} is" if phase else "voltages are"
+        high = f"{abs(drop['value']):.2g} V too {'high' if drop['value'] > 0.0 else 'low'}"
+        why = "as one is that is computed of duty cycles without the drop of the switches and their dead time"
+        return {
+            "equation": equation, "along": "current", "form": "sensor_curve", "parameters": {"drop": drop, "turn": said["drop.turn"]},
+            "sentence": f"In the measuring chain: the recorded {which} {high} in the current's direction, {why}.",
         }  # fmt: skip
     if kind == "controller":
         ((amount, _),) = linear.values()

@@ -110,6 +110,7 @@ def _of_group(group: str, short: str) -> str:
         "lag": f"{'output position' if channel == 'output' else channel} channel {_late(side)}",
         "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
+        "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
         "drift_current": f"drift of the current channel of phase {short}",
         "drift_voltage": f"drift of the voltage channel of phase {short}",
     }
