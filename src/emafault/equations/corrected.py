@@ -24,8 +24,8 @@ OF_THE_CHANNEL = ("frequency", "step_change")
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
     """The recordings less the faults of their measuring chain, and what has been undone.
 
-    Lag, curve, drop, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents are
-    replaced by the mean of their neighbours. What cannot be undone (held samples, converter steps, clipping) stays.
+    Lag, curve, drop, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents
+    are replaced by the mean of their neighbours. What cannot be undone (held samples, converter steps, clipping) stays.
     """
     out, undone = {}, dict[str, None]()
     for name, recording in recordings.items():

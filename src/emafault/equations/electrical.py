@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from ..switches import direction
 from .acquisition import bent, dropped, recorded_late
 from .commutation import EDGE, LONGEST, REACH, rows_of, sweep
-from .dual import Dual, value_of
+from .dual import Dual, Number, value_of
 from .point import State, effect_name
 from .signals import passing_time
 from .terms import with_hook
@@ -22,6 +23,7 @@ RUN = 1e-3  # s, longest run of intervals that is averaged in motion
 RESTING = 5e-2  # s, at rest
 LENGTHS = (0.5, 1.0)  # of the longest, drawn for each run
 UNKNOWN = 0.2  # of the inductance's voltage, where no end currents tell of tolerance and saturation
+TURNING = 0.5  # of a drop of the switches, that is not known of a current while its direction turns
 BESIDE = 2  # intervals in which a current may fade after its phase is switched off
 NAMES = ("electrical_a", "electrical_b", "electrical_c")
 
@@ -188,8 +190,11 @@ def _conducts(rec, j: int) -> np.ndarray:
 
 def noise_bands(state: State, j: int) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (V2): white, and that of differenced end currents and angles."""
-    rec, a, s = state.rec, state.rec.actuator, state.rec.noise
-    white = s.voltage**2 + (a.resistance * s.current) ** 2
+    p, rec, a, s = state.p, state.rec, state.rec.actuator, state.rec.noise
+    white: Number = s.voltage**2 + (a.resistance * s.current) ** 2
+    if drop := sum(float(p(f"drop.{of}").value) for of in ("voltage", f"voltage_{'abc'[j]}")):
+        turned = direction(rec.current[:, j], float(p("drop.turn").value))
+        white = white + (TURNING * drop * (1.0 - turned**2)) ** 2
     f = np.asarray(value_of(state.conducting[j]))
     angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
     if rec.current_end is None:

@@ -145,10 +145,12 @@ def told_of_chain(
         ((at, drop),) = ((n, v) for n, v in said.items() if n != "drop.turn")
         phase = at.partition("_")[2]
         which = f"voltage of phase {phase} is" if phase else "voltages are"
-        high = f"{abs(drop['value']):.2g} V too {'high' if drop['value'] > 0.0 else 'low'}"
+        (amount, _) = linear[at]
+        high = f"{abs(amount):.2g} V too {'high' if amount > 0.0 else 'low'}"
         why = "as one is that is computed of duty cycles without the drop of the switches and their dead time"
         return {
-            "equation": equation, "along": "current", "form": "sensor_curve", "parameters": {"drop": drop, "turn": said["drop.turn"]},
+            "equation": equation, "along": "current", "form": "sensor_curve",
+            "parameters": {"drop": drop, "turn": said["drop.turn"]},
             "sentence": f"In the measuring chain: the recorded {which} {high} in the current's direction, {why}.",
         }  # fmt: skip
     if kind == "controller":
