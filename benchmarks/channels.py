@@ -56,6 +56,8 @@ CHANNELS = {
     "voltages' noise ten times": noisier(10.0, "voltage"),
     "speed's noise ten times": noisier(10.0, "speed"),
     "angle's noise ten times": noisier(10.0, "angle"),
+    "currents late by half an interval": entry("current", "lag", lag=0.5),
+    "angle late by half an interval": entry("angle", "lag", lag=0.5),
     "currents smoothed": entry("current", "smoothing", delay=0.4),
     "voltages smoothed": entry("voltage", "smoothing", delay=0.4),
     "voltages of duty cycles": entry("voltage", "drop", drop=0.7, turn=0.1),

@@ -4,6 +4,7 @@ import numpy as np
 
 from .compiled import compiled
 
+MOST = 0.95  # of a recursion's pole
 LEAST = 1e-6  # interval, of a constant that does anything
 
 
@@ -16,6 +17,28 @@ def followed(x, gain, decay):
         before = gain * x[n] + decay * before
         y[n] = before
     return y
+
+
+def ahead(x: np.ndarray, lag: float) -> np.ndarray:
+    """The signal y of which x[n] = (1 - lag) y[n] + lag y[n - 1] is recorded, (sample,).
+
+    It follows from the samples before where the lag is below one half, else from those after. About one half, where a
+    wave of two samples is not recorded, the recursion keeps to ``MOST`` and the rest is interpolated.
+    """
+    if lag < LEAST:
+        return x
+    if lag > 0.5:  # backwards in time it leads by what it lacks to a whole sample
+        later = np.concatenate([x[1:], x[-1:]])
+        return ahead(later[::-1], 1.0 - lag)[::-1] if lag < 1.0 else _between(later, lag - 1.0)
+    within = min(lag, MOST / (1.0 + MOST))
+    decay = within / (1.0 - within)
+    return _between(x[0] + followed(x - x[0], 1.0 + decay, -decay), lag - within)
+
+
+def _between(x: np.ndarray, share: float) -> np.ndarray:
+    out = x.copy()
+    out[:-1] += share * (x[1:] - x[:-1])
+    return out
 
 
 def smoothed(x: np.ndarray, memory: float) -> np.ndarray:

@@ -201,6 +201,43 @@ def test_a_bent_curve_of_the_voltages_is_told_and_undone(tmp_path):
         assert np.std(got.phase_voltage - r.phase_voltage) < 0.1 * np.std(faulty[name].phase_voltage - r.phase_voltage)
 
 
+@pytest.mark.parametrize("lag", [0.4, -0.4])
+def test_an_angle_that_lags_is_told_and_undone(lag, tmp_path):
+    true = bench(COGGING)
+    late = {}
+    for name, r in true.items():
+        other = np.roll(r.rotor_angle, 1 if lag > 0.0 else -1)
+        other[0 if lag > 0.0 else -1] = r.rotor_angle[0 if lag > 0.0 else -1]
+        late[name] = replace(r, rotor_angle=r.rotor_angle + abs(lag) * (other - r.rotor_angle))
+    names = list(late)
+    found = diagnose("bench", late, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("lag", "sensor_angle")
+    (amount,) = told["parameters"].values()
+    assert amount["value"] == pytest.approx(abs(lag), rel=0.05)
+    assert told["term"] == {"place": "angle", "form": "lag", "lag": pytest.approx(lag, rel=0.05)}
+    assert "lag of the angle channel" in write_corrected(found, late, tmp_path / "bench", tmp_path / "new")
+    for name, r in true.items():
+        got = read_recording(tmp_path / "new" / name)
+        assert np.std(got.rotor_angle - r.rotor_angle) < 0.1 * np.std(late[name].rotor_angle - r.rotor_angle)
+
+
+@pytest.mark.parametrize("lag", [0.2, 0.5, 1.0])
+def test_currents_that_lag_are_told(lag):
+    def lagging(x):
+        return x + lag * (np.vstack([x[:1], x[:-1]]) - x)
+
+    late = {
+        n: replace(r, phase_current=lagging(r.phase_current), phase_current_end=lagging(r.phase_current_end))
+        for n, r in bench(COGGING).items()
+    }
+    verdict = verdict_of(late)
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    told = next(d for d in verdict["discovered"] if d["equation"] == "sensor_current")
+    assert told["form"] == "lag" and next(iter(told["parameters"].values()))["value"] == pytest.approx(lag, rel=0.1)
+
+
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
     true = bench(COGGING)
     of_duty = {

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..first_order import LEAST, filtered, smoothed
+from ..first_order import LEAST, ahead, filtered, smoothed
 from ..switches import direction, turning
 from .dual import Dual, Number
 from .point import Point, effect_name
@@ -79,10 +79,10 @@ def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray) -> Dual:
     """
     late, early, smooth, constant = (p(f"lag.{channel}_{of}") for of in ("late", "early", "smoothed", "filtered"))
     out = Dual(x)
-    if late.slopes or late.value:
-        out = out + late * advanced(x)
-    if early.slopes or early.value:
-        out = out + early * delayed(x)
+    if late.slopes or late.value > LEAST:
+        out = out + _ahead(x, late)
+    if early.slopes or early.value > LEAST:
+        out = out + _ahead(x[::-1], early).linear(lambda y: y[::-1], len(x))
     if smooth.slopes or smooth.value:
         out = out - smooth * delayed(x)
     if constant.slopes or constant.value:
@@ -91,6 +91,18 @@ def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray) -> Dual:
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (advanced(x) - delayed(x)))
     return out
+
+
+def _ahead(x: np.ndarray, lag: Dual) -> Dual:
+    """What a signal changes by that is taken from a channel which lags.
+
+    At none the derivative is the change at a lag of one, which is exact: from there on a small one is found as well.
+    """
+    at = float(lag.value)
+    if at <= LEAST:
+        return lag.through(0.0, advanced(x))
+    there = ahead(x, at)
+    return lag.through(there - x, (ahead(x, at + STEP) - there) / STEP if lag.slopes else 0.0)
 
 
 def rates(mean: np.ndarray, at_end: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

@@ -33,6 +33,7 @@ BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and o
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
+LATE_ANGLE = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of an angle that lags, with their sides
 
 
 class ReferenceActuator:
@@ -55,6 +56,7 @@ class ReferenceActuator:
         self._disturbed: dict[str, Signals] = {}
         self._along: dict[tuple[str, str], dict[str, Any]] = {}
         self._functions: dict[str, dict[str, Any]] = {}
+        self._late: dict[str, dict[str, np.ndarray]] = {}  # by recording and equation, what a late angle takes out
         self.large = sum(r.size for r in self.recordings.values()) > LARGE
         self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in self.catalogue.items() if k not in exclude}
@@ -129,9 +131,27 @@ class ReferenceActuator:
         """
         self.prepare(name, values)
         rec = self._noisy(name) if disturbed else self.recordings[name]
-        return self._recording(values, _less(rec, less or {}), wanted)
+        late = [n for n in LATE_ANGLE if wanted is None or n in wanted]
+        less = dict(less or {})
+        if lag := sum(sign * values.get(n, 0.0) for n, sign in LATE_ANGLE.items()):
+            less["angle"] = less.get("angle", 0.0) - lag * self._turned(name)
+        blocks = self._recording(values, _less(rec, less), wanted)
+        if late and name not in self._late:
+            if self.large:
+                self._late.clear()
+            self._late[name] = {e: -x[0] for e, x in self.seen_in("angle", name, self._turned(name)[None]).items()}
+        for block in blocks if late else ():
+            column = self._late[name].get(block.equation)
+            if column is None:
+                column = -self.seen_at(values, name, self._turned(name)[None], less)[0]
+            block.columns |= {n: LATE_ANGLE[n] * column for n in late}
+        return blocks
 
     # ---- the measuring chain
+    def _turned(self, name: str) -> np.ndarray:
+        """(sample,) by how much the angle changes in an interval, about each sample (rad)."""
+        return np.gradient(self.recordings[name].angle)
+
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
         """Channels in which a form of a driver of an equation may lie, rather than in the equation itself."""
         return CHANNELS.get((equation, driver), ())

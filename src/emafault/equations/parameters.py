@@ -133,9 +133,10 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
 def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[Unit]:
     """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift."""
     out = []
-    for channel in ("voltage", "current", "output", "speed"):
-        # that the speed's comes late is in the catalogue
-        ways = ("late", "early", "smoothed", "filtered") if channel != "speed" else ("early",)
+    # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
+    only = {"speed": ("early",), "angle": ("late", "early")}
+    for channel in ("voltage", "current", "output", "speed", "angle"):
+        ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
         variants = [
             Variant(
                 [Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")],
@@ -145,7 +146,7 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
             )
             for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=4.0, alike=len(ways) > 1))
+        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=5.0, alike=len(ways) > 2))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
