@@ -409,9 +409,12 @@ class Bench(NormalEquations):
         """A set of which units have just been switched on, at its own optimum, or without them where it was ``begun``,
         if that is better.
 
-        A secant points the way only: its effect finds its place before anything undescribed takes it, or finds none.
+        A secant points the way only: its effect finds its place before anything that a scan proposed or no one has
+        described takes it, or finds none. Faults of the measuring chain stay: beside one that is not in the set no
+        effect finds its place.
         """
-        kept = [c for c in model.choices if self._kind(c.unit) not in ("form", "remainder")]
+        proposed = {f.id for f in self.described}
+        kept = [c for c in model.choices if self._kind(c.unit) != "remainder" and c.unit not in proposed]
         found = self.settle(Model(tuple(kept), 0.0, 0.0, {}, {}))
         if found.log_posterior >= model.log_posterior:
             return found
