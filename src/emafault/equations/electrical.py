@@ -200,6 +200,7 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
     if rec.current_end is None:
         runs = _runs(state, j)
         of, lengths = runs.mean, runs.lengths
+        white = of(np.broadcast_to(white, rec.size))
         # at a run's ends the mean of two neighbours is off by the ripple, and by a sixth of the curvature
         i = rec.current[:, j]
         bend = np.abs(np.diff(i, 2, prepend=i[:1], append=i[-1:])) / 6.0
