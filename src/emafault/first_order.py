@@ -4,7 +4,7 @@ import numpy as np
 
 from .compiled import compiled
 
-MOST = 0.95  # of a recursion's pole
+MOST = 0.95  # largest pole of a recursion that undoes a lag
 LEAST = 1e-6  # interval, of a constant that does anything
 
 

@@ -64,7 +64,8 @@ class Chain:
                 for x, y in zip(_channels(signals, entry["place"]), _channels(true, source), strict=True):
                     x += entry["gain"] * y
             elif entry["form"] == "drop":
-                (x,), (i, *_) = _channels(signals, entry["place"]), _channels(true, f"current{entry['place'][7:]}")
+                current = entry["place"].replace("voltage", "current")
+                (x,), (i, *_) = _channels(signals, entry["place"]), _channels(true, current)
                 x += entry["drop"] * direction(i, entry["turn"])
             elif entry["form"] not in AFTER_NOISE:
                 for x in _channels(signals, entry["place"]):

@@ -133,24 +133,35 @@ class ReferenceActuator:
         rec = self._noisy(name) if disturbed else self.recordings[name]
         late = [n for n in LATE_ANGLE if wanted is None or n in wanted]
         less = dict(less or {})
-        if lag := sum(sign * values.get(n, 0.0) for n, sign in LATE_ANGLE.items()):
-            less["angle"] = less.get("angle", 0.0) - lag * self._turned(name)
+        lag = sum(sign * values.get(n, 0.0) for n, sign in LATE_ANGLE.items())
+        turned = np.gradient(self.recordings[name].angle) if late or lag else None  # in an interval (rad)
+        if turned is not None and lag:
+            less["angle"] = less.get("angle", 0.0) - lag * turned
         blocks = self._recording(values, _less(rec, less), wanted)
-        if late and name not in self._late:
-            if self.large:
-                self._late.clear()
-            self._late[name] = {e: -x[0] for e, x in self.seen_in("angle", name, self._turned(name)[None]).items()}
-        for block in blocks if late else ():
-            column = self._late[name].get(block.equation)
-            if column is None:
-                column = -self.seen_at(values, name, self._turned(name)[None], less)[0]
-            block.columns |= {n: LATE_ANGLE[n] * column for n in late}
+        if turned is not None and late:
+            self._add_late_angle(blocks, values, turned, late, less)
         return blocks
 
     # ---- the measuring chain
-    def _turned(self, name: str) -> np.ndarray:
-        """(sample,) by how much the angle changes in an interval, about each sample (rad)."""
-        return np.gradient(self.recordings[name].angle)
+    def _add_late_angle(
+        self,
+        blocks: Sequence[Block],
+        values: Mapping[str, float],
+        turned: np.ndarray,
+        names: Sequence[str],
+        less: Mapping[str, np.ndarray],
+    ) -> None:
+        """Columns of the lag of an angle that turns by so much in an interval, (sample,), to blocks of a recording."""
+        name = blocks[0].recording
+        if name not in self._late:
+            if self.large:
+                self._late.clear()
+            self._late[name] = {e: -x[0] for e, x in self.seen_in("angle", name, turned[None]).items()}
+        for block in blocks:
+            column = self._late[name].get(block.equation)
+            if column is None:
+                column = -self.seen_at(values, name, turned[None], less)[0]
+            block.columns |= {n: LATE_ANGLE[n] * column for n in names}
 
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
         """Channels in which a form of a driver of an equation may lie, rather than in the equation itself."""

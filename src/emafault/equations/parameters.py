@@ -146,7 +146,9 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
             )
             for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=5.0, alike=len(ways) > 2))
+        out.append(
+            Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=5.0, alike=set(MADE) <= set(ways))
+        )
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
