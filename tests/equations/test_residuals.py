@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
+from emafault.diagnosis.linear import compressed_columns, correct, disturbance
 from emafault.diagnosis.whitening import whiten
 from emafault.effects import EFFECTS
 
@@ -111,6 +112,26 @@ def test_the_control_law_holds_where_a_step_is_braked(theta_0):
     assert block.usable.sum() > 10
     # the changes add up to that from the first row to the last: 0.04 A where what a commutation adds is left out
     assert abs(block.residual[block.usable].sum()) < 0.015
+
+
+def test_a_lag_of_the_speed_is_where_it_fits_best():
+    """A longer one smooths the noise of the angle that the speed is compared with, which tells nothing of the lag."""
+    true = {"speed_latency": {"tau": 1e-5}}
+    recording = recorded("sine", interval=5e-5, effects=true)
+    machine = machine_of({"a.nc": recording})
+    found = {}
+    for tau in (0.0, 1e-5, 2e-5, 4e-5):
+        values = truth(machine, recording, {"speed_latency": {"tau": tau}})
+        for block, other in zip(
+            machine.blocks(values, "a.nc", wanted=()),
+            machine.blocks(values, "a.nc", disturbed=True, wanted=()),
+            strict=True,
+        ):
+            if block.equation == "sensor_speed":
+                white = compressed_columns(block, [], [block.residual], None)
+                correct(white, disturbance(block, other, [], None))
+                found[tau] = white.misfit
+    assert min(found, key=lambda tau: found[tau]) == 1e-5
 
 
 def test_a_current_that_flows_on_makes_torque():

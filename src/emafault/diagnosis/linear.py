@@ -145,8 +145,12 @@ def compressed_columns(block: Block, names: list[str], columns: Sequence, weight
 
 
 def _spread(block: Block, used: np.ndarray) -> float:
-    """Log determinant of the noise's covariance over the rows used."""
-    return 2.0 * float(np.sum(np.log(block.factor[0][used & block.usable])))
+    """Log determinant of the noise's covariance over the rows used, where the point changes how large errors may be.
+
+    Of a noisy signal that the point only filters it says nothing: the likelihood with the true signal at its best has
+    none (functional errors in variables: Fuller 1987, Measurement Error Models, section 1.1.2).
+    """
+    return 0.0 if block.sure else 2.0 * float(np.sum(np.log(block.factor[0][used & block.usable])))
 
 
 def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:

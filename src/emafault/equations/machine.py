@@ -251,7 +251,8 @@ class ReferenceActuator:
         columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
         along = self._coordinates(state, name)
         rounded = (state.rec.output_step if name == "position" else state.rec.current_step) > 0.0
-        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded)
+        sure = name == "sensor_speed"
+        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded, sure)
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""

@@ -7,6 +7,7 @@ from ...first_order import filtered
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
 SHORTEST = 1e-6  # s
+STEP = 1e-3  # of an interval, of which the derivative is taken
 FADED, LONGEST = 1e-4, 500  # of a response: what is left at its end, and intervals that it has at most
 
 
@@ -24,6 +25,5 @@ def speed(p, rec, w):
     at, h = max(tau.value, 0.0), rec.interval
     if not tau.slopes:
         return w if at < SHORTEST else w.linear(lambda x: filtered(x, at / h), rec.size)
-    step = 1e-5
-    slope = (filtered(w.value, (at + step) / h) - filtered(w.value, at / h)) / step
+    slope = (filtered(w.value, at / h + STEP) - filtered(w.value, at / h)) / (STEP * h)
     return w.linear(lambda x: filtered(x, at / h), rec.size) + tau.through(0.0, slope)
