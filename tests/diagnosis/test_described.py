@@ -49,7 +49,7 @@ class Machine:
 def test_a_form_is_much_like_the_effect_that_it_resembles(form, nearest):
     """The tolerance of the coefficient has the effect's own column, and does not hide it."""
     bench = Bench(Machine(form), ["a"])
-    model = Model(tuple(Choice(u.id, 0, 1.0) for u in Machine.units), 0.0, 0.0, {}, {})
+    model = Model(tuple(Choice(u.id, 0, 1.0) for u in Machine.units))
     normal = bench.normal(bench.linearise(model, corrected=False), model)
     reduced = bench.reduce(normal)
     search = Search(reduced, *bench.candidates(reduced))

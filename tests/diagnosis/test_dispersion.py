@@ -43,7 +43,7 @@ def fitted(burst, kind=Machine):
     bench = Bench(machine, list(machine.noise))
     white = Weights(np.ones(ROWS, bool), np.zeros(0), np.ones(ROWS))
     bench.carried = {n: {"torque": white, "bus": white} for n in machine.noise}
-    drag = Model((Choice("drag", 0, 1.0),), 0.0, 0.0, {}, {})
+    drag = Model((Choice("drag", 0, 1.0),))
     normal = bench.normal(bench.linearise(drag, corrected=False), drag)
     reduced = bench.reduce(normal)
     search = Search(reduced, *bench.candidates(reduced))
@@ -88,9 +88,9 @@ def test_the_score_is_that_of_all_equations_that_an_estimate_rests_on():
 def test_a_set_without_a_unit_that_the_point_has_leaves_what_the_unit_adds():
     """The same score, whether the point has a unit that is no member of the set or not."""
     bench, fit, _ = fitted(0.0)
-    nothing = Model((), 0.0, 0.0, {}, {})
+    nothing = Model(())
     assert "drag.c" not in bench.own_deviations(nothing, fit.normal)
     bench.point["drag.c"], bench.on = 0.1, {"drag"}
-    drag = Model((Choice("drag", 0, 1.0),), 0.0, 0.0, {}, {})
+    drag = Model((Choice("drag", 0, 1.0),))
     normal = bench.normal(bench.linearise(drag, corrected=False), drag)
     assert bench.own_deviations(nothing, normal)["drag.c"] == pytest.approx(-0.1)

@@ -242,7 +242,7 @@ def test_remainders_are_integrated_over_what_the_explored_recordings_leave_open(
         reduced=Reduced(names[:2], M, np.zeros(2), 0.0, np.zeros(2)),
     )  # fmt: skip
     bench = SimpleNamespace(inserted=lambda m, normal: SimpleNamespace(values={}))
-    left = Model((Choice("remainder:torque", 0, width),), 0.0, 0.0, {}, {})
+    left = Model((Choice("remainder:torque", 0, width),))
     explored = held_out.Explored(bench, SimpleNamespace(search=search, normal=None), ladder)
     found = held_out._misfit(explored, left)
     posterior = np.zeros((3, 3))

@@ -43,7 +43,7 @@ def test_a_cause_is_fitted_beside_what_is_held_at_the_end_of_its_prior():
         parameters = {"a": Parameter("a", 0.0, 0.0, 1.0), "b": Parameter("b", 0.0, 0.0, 10.0)}  # noqa: RUF012
 
     bench = Bench(WithCause(), ["r"])
-    model = Model((Choice("b", 0, 1.0),), 0.0, 0.0, {}, {})
+    model = Model((Choice("b", 0, 1.0),))
     found, normal = bench._fitted(model, corrected=False)
     assert found.deviations["b"] < 0.0  # with the nuisance at 5
     bench.move(found, normal)
@@ -68,7 +68,7 @@ class Bent(Machine):
 
 def test_a_step_after_which_a_set_fits_worse_is_shortened():
     bench = Bench(Bent(), ["r"])
-    model = Model((Choice("c", 0, 1.0),), 0.0, 0.0, {}, {})
+    model = Model((Choice("c", 0, 1.0),))
     assert bench._fitted(model, corrected=False)[0].deviations["c"] > 9.0
     bench.settle(model, steps=6)
     assert bench.point["c"] == pytest.approx(3.0, abs=0.01)
@@ -89,7 +89,7 @@ def test_one_of_variants_that_look_alike_near_off_is_the_best_at_its_own_optimum
             return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
 
     bench = Bench(Alike(), ["r"])
-    taken = bench.settle(Model((Choice("u", 0, 1.0),), 0.0, 0.0, {}, {}))
+    taken = bench.settle(Model((Choice("u", 0, 1.0),)))
     assert bench.point["c"] > 0.2
     best = bench._by_own_variants(taken)
     assert [c.variant for c in best.choices] == [1]

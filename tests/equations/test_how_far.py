@@ -13,7 +13,7 @@ UNITS = {
 
 
 def _set(members):
-    return Model(tuple(Choice(unit, variant, 1.0) for unit, variant in members), 0.0, 0.0, {}, {})
+    return Model(tuple(Choice(unit, variant, 1.0) for unit, variant in members))
 
 
 def _inserted(told):

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from .evidence import Definite, Normal, Reduced
-from .fit import Bench, Inserted
+from .fit import Bench
 from .linear import White, assemble, compressed, correct, disturbance, white_rows
 from .model import SETTINGS, Block
 from .point import is_parameter
+from .settling import Inserted
 
 STEPS = 6  # of a refit of what belongs to a recording alone, at most
 STILL = 0.05  # log evidence that one more of them may still promise

@@ -1,35 +1,32 @@
 """The fit of a bench: linearise, search, relinearise at what leads, until it stands still."""
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import expit
 
 from .described import Described, proposed, refined, with_forms
-from .evidence import SETTLED, Normal
+from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
 from .model import LISTED
 from .naming import NAMED
-from .normal import NormalEquations
-from .point import is_parameter
+from .point import Place
 from .search import NEAR, OTHER_FORM, Model, Search
+from .settling import Settling
 
 ROUNDS = 3
 LINEAR = 0.01  # of what an effect explains, that a linear model may be wrong by
 FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
-SETTLING = 3  # steps of a set to its own optimum
-HALVINGS = 6  # of a step after which a set fits worse than before
 SINGLES = 3  # causes that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
 SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
 SPREAD = 3  # recordings that they are of at least
-FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
 
 
-NOTHING = Model((), 0.0, 0.0, {}, {})  # the unit alone
+NOTHING = Model(())  # the unit alone
 
 
 @dataclass
@@ -44,48 +41,13 @@ class Fit:
     search: Search
 
 
-@dataclass(frozen=True)
-class Began:
-    """Where a step began: the point, and its misfit (nats) with the noise's part and, where that is known, without."""
-
-    point: dict[str, float]
-    misfits: tuple[float, float | None]
-
-    def holds(self, after: tuple[float, float | None], slack: float) -> bool:
-        """Whether the misfit after the step is no larger."""
-        whole, less = self.misfits
-        return after[1] < less + slack if less is not None and after[1] is not None else after[0] < whole + slack
-
-
-@dataclass
-class Inserted:
-    """A fitted set as a model of other recordings: all values, and what stands beside them.
-
-    ``beside``: coefficients of remainders and own forms by column; ``own``: sizes of the units that carry their own
-    form.
-    """
-
-    values: dict[str, float]
-    beside: dict[str, float]
-    own: dict[str, dict[str, float]]
-
-
-def halfway(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
-    """The point in the middle of two."""
-    return {n: 0.5 * (one[n] + other[n]) for n in other}
-
-
-class Bench(NormalEquations):
+class Bench(Settling):
     """A bench with the search over its sets."""
 
-    searching: type[Search] = Search
     describing = True  # whether recordings are long enough to tell forms and the colour of the noise from each other
-    settled = SETTLED
 
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
-        self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
-        self._inserted: dict[tuple, Inserted] = {}
         self.looked_at: tuple[str, ...] | None = None  # units of the set at which the weights were taken
 
     def fit(self, begun: "tuple[Bench, Fit] | None" = None) -> Fit:
@@ -164,11 +126,6 @@ class Bench(NormalEquations):
                 break
         return whites, renewed, search
 
-    @property
-    def described(self) -> tuple[Described, ...]:
-        """Forms that have been proposed."""
-        return self.machine.forms
-
     def describe(self, forms: Sequence[Described]) -> None:
         """Take described forms among the candidate causes."""
         if tuple(forms) == self.described:
@@ -229,23 +186,6 @@ class Bench(NormalEquations):
         self.describe([better.get(f.id, f) for f in before])
         return self.described != before
 
-    def _by_own_variants(self, model: Model) -> Model:
-        """A set that the point has settled at, with the variant of each unit whose variants look alike near off that is
-        best at its own optimum, where the point moves."""
-        alike = {u.id: u for u in self.units if u.alike}
-        for unit in (alike[u] for u in model.units if u in alike):
-            ends = [(model, dict(self.point), set(self.on))]
-            amount = sum(self.point[p.name] for p in unit.parameters)
-            for v, variant in enumerate(unit.variants):
-                if v in [c.variant for c in model.choices if c.unit == unit.id]:
-                    continue
-                self.point, self.on = dict(ends[0][1]), set(ends[0][2])
-                self.point |= {p.name: p.off for p in unit.parameters} | {p.name: amount for p in variant.parameters}
-                other = tuple(replace(c, variant=v) if c.unit == unit.id else c for c in model.choices)
-                ends.append((self.settle(Model(other, 0.0, 0.0, {}, {})), dict(self.point), set(self.on)))
-            model, self.point, self.on = max(ends, key=lambda e: e[0].log_posterior)
-        return model
-
     def _begun_at_single(self, normal: Normal) -> bool:
         """Move the point to the best single cause where that, at its own optimum, is better than what the linear model
         has lead; whether it is.
@@ -263,15 +203,15 @@ class Bench(NormalEquations):
                 if m[0] not in best or single.log_posterior > best[m[0]].log_posterior:
                     best[m[0]] = single
         singles = sorted(best.values(), key=lambda m: -m.log_posterior)[:SINGLES]
-        begun = dict(self.point), set(self.on)
+        begun = self.here()
         ends = []
         for model in [leading, *singles]:
-            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.go_to(begun)
             found = self.settle(model, normal)
-            ends.append((found.log_posterior, dict(self.point), set(self.on)))
-        value, point, on = max(ends, key=lambda e: e[0])
+            ends.append((found.log_posterior, self.here()))
+        value, place = max(ends, key=lambda e: e[0])
         better = value > ends[0][0]
-        self.point, self.on = (point, on) if better else begun
+        self.go_to(place if better else begun)
         return better
 
     def _renewed(self) -> tuple[list[White], Normal]:
@@ -339,128 +279,10 @@ class Bench(NormalEquations):
     # ---- sets, each at its own optimum
     def _ahead(self, model: Model, normal: Normal) -> float:
         """Log evidence that a model's step from the point promises, which stays."""
-        kept = dict(self.point), set(self.on)
+        kept = self.here()
         ahead = self.move(model, normal)
-        self.point, self.on = kept
+        self.go_to(kept)
         return ahead
-
-    def settle(self, model: Model, normal: Normal | None = None, steps: int = SETTLING) -> Model:
-        """A set at its own optimum, by Gauss-Newton from the present point, which moves there.
-
-        ``normal`` of a model fitted there saves the first step.
-        """
-        ahead = to_come = np.inf  # log evidence that the last step promised, and that the next one will
-        began: Began | None = None
-        if normal is not None:
-            begun = dict(self.point), set(self.on)
-            if self.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
-                began = Began(dict(self.point), self._misfits(normal, model, True))
-            ahead = to_come = self.move(model, normal)
-            if ahead < self.settled:
-                return model
-            new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun[1]}
-            if new:
-                return self._settle_secants(model, new, begun)
-        # on its way a set may be led by a little bias, where it ends it must not
-        for enough, corrected in ((FAR, False), (self.settled, True)):
-            for _ in range(steps):
-                if to_come < enough:
-                    break
-                found, at_point, misfits = self._nearer(model, corrected, began)
-                began, ended = Began(dict(self.point), misfits) if self.on <= set(model.units) else None, began
-                if ended is not None and began is not None and ended.point == began.point:
-                    to_come = 0.0
-                    break
-                before, ahead = ahead, self.move(found, at_point)
-                # steps shrink on at least as they did
-                to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
-            left, to_come = to_come, np.inf
-        if left > FAR and began is not None:  # what the last steps promised they have not held
-            self.point = dict(began.point)
-            found.log_posterior -= ahead
-        return found
-
-    def _nearer(
-        self, model: Model, corrected: bool, began: Began | None
-    ) -> tuple[Model, Normal, tuple[float, float | None]]:
-        """A set fitted at the present point, or nearer to where the last step began if it fits worse here than there,
-        in the end at that point, which is where the point then lies (backtracking; Nocedal and Wright 2006, section
-        3.1); and its misfits there."""
-        for halving in range(HALVINGS + 1):
-            found, at_point = self._fitted(model, corrected)
-            misfits = self._misfits(at_point, found, corrected)
-            if began is None or halving == HALVINGS or began.holds(misfits, self.settled):
-                break
-            last = halving == HALVINGS - 1
-            self.point = dict(began.point) if last else halfway(began.point, self.point)
-        return found, at_point, misfits
-
-    def _misfits(self, normal: Normal, model: Model, corrected: bool) -> tuple[float, float | None]:
-        """Half the squared misfit of a set at the present point (nats), with that of the parameters from their priors,
-        and the same less the noise's part, where it is known.
-
-        Columns beside the point, which the set is linear in, are at their best.
-        """
-        apart = sum((mean / sd) ** 2 for mean, sd, _ in (self.prior(n) for n in normal.names if is_parameter(n)))
-        misfit = 0.5 * float(normal.c + apart) - self.gained_beside(model, normal)
-        return misfit + 0.5 * normal.own, misfit if corrected else None
-
-    def _settle_secants(self, model: Model, new: set[str], begun: tuple[dict[str, float], set[str]]) -> Model:
-        """A set of which units have just been switched on, at its own optimum, or without them where it was ``begun``,
-        if that is better.
-
-        A secant points the way only: its effect finds its place before anything that a scan proposed or no one has
-        described takes it, or finds none. Faults of the measuring chain stay: beside one that is not in the set no
-        effect finds its place.
-        """
-        proposed = {f.id for f in self.described}
-        kept = [c for c in model.choices if self._kind(c.unit) != "remainder" and c.unit not in proposed]
-        found = self.settle(Model(tuple(kept), 0.0, 0.0, {}, {}))
-        if found.log_posterior >= model.log_posterior:
-            return found
-        there = dict(self.point), set(self.on)
-        self.point, self.on = begun
-        less = self.settle(Model(tuple(c for c in kept if c.unit not in new), 0.0, 0.0, {}, {}))
-        if less.log_posterior > found.log_posterior:
-            self.closer |= dict.fromkeys(new, found.log_posterior - less.log_posterior)
-            return less
-        self.point, self.on = there
-        return found
-
-    def inserted(self, model: Model, normal: Normal) -> Inserted:
-        """A set at its own optimum, where the point is left as it was; ``normal`` of the present point."""
-        key = model.choices, tuple(sorted(self.point.items()))
-        if key in self._inserted:
-            return self._inserted[key]
-        kept = dict(self.point), set(self.on), dict(self.sizes)
-        found = self.settle(model, normal)
-        values = self.values()
-        own = {
-            u: {self.parameters[n].alias or n: d for n, d in sizes.items()}
-            for u, sizes in self.sizes.items()
-            if u in found.units
-        }
-        self.point, self.on, self.sizes = kept
-        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
-        self._inserted[key] = Inserted(values, beside, own)
-        return self._inserted[key]
-
-    def _fitted(self, model: Model, corrected: bool = True) -> tuple[Model, Normal]:
-        """A set fitted by the linear model of the present point, and that model; its members' widths stay."""
-        shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
-        choices = tuple(
-            replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c for c in model.choices
-        )
-        this = replace(model, choices=choices)
-        at_point = self.normal(self.linearise(this, corrected=corrected), this)
-        reduced = self.reduce(at_point)
-        search = self.searching(reduced, *self.candidates(reduced))
-        width = {
-            (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
-            for c in choices
-        }
-        fixed = {m: w for m, w in width.items() if w in search.candidates[m].widths}
-        return search.fit(tuple(width), fixed), at_point
 
     def _leave_out(self, search: Search, normal: Normal) -> bool:
         """Compare the leading set with those that lack one member, or have a listed effect in the place of a described
@@ -472,29 +294,29 @@ class Bench(NormalEquations):
         members = [u for u in best.units if not u.startswith("remainder:")]
         if not members:
             return False
-        begun = dict(self.point), set(self.on)
+        begun = self.here()
         leading = self.settle(best, normal)
         top = leading.log_posterior
-        better = (dict(self.point), set(self.on)), False
+        better: Place | None = None
         for unit in members:
-            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.go_to(begun)
             less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
             self.move(less, normal)  # where the linear model has the set's optimum
-            own = self.settle(Model(less.choices, 0.0, 0.0, {}, {}))
+            own = self.settle(Model(less.choices))
             error = best.log_posterior - less.log_posterior - (leading.log_posterior - own.log_posterior)
             if self._by_secant(unit):
                 self.closer[unit] = -error
             less.log_posterior += error
             if own.log_posterior > top:
-                top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
+                top, better = own.log_posterior, self.here()
         for listed in self._listed_instead(search, best):
-            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.go_to(begun)
             self.move(listed, normal)
-            own = self.settle(Model(listed.choices, 0.0, 0.0, {}, {}))
+            own = self.settle(Model(listed.choices))
             if own.log_posterior > top:
-                top, better = own.log_posterior, ((dict(self.point), set(self.on)), True)
-        self.point, self.on = better[0] if better[1] else begun
-        return better[1]
+                top, better = own.log_posterior, self.here()
+        self.go_to(better or begun)
+        return better is not None
 
     def _against_rivals(self, search: Search, normal: Normal) -> None:
         """Compare the leading set with those that have another listed effect in the place of one that it nearly stands
@@ -516,12 +338,12 @@ class Bench(NormalEquations):
                         rivals.append((unit, m[0], found))
         if not rivals:
             return
-        begun = dict(self.point), set(self.on)
+        begun = self.here()
 
         def at_its_own(model: Model) -> float:
-            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.go_to(begun)
             self.move(model, normal)
-            return self.settle(Model(model.choices, 0.0, 0.0, {}, {})).log_posterior
+            return self.settle(Model(model.choices)).log_posterior
 
         leading = at_its_own(best)
         for unit, rival, model in rivals:
@@ -529,7 +351,7 @@ class Bench(NormalEquations):
             for other in search.seen.values():
                 if rival in other.units and unit not in other.units:
                     other.log_posterior += error
-        self.point, self.on = begun
+        self.go_to(begun)
 
     def _listed_instead(self, search: Search, best: Model) -> list[Model]:
         """A set with each of the likeliest listed effects in the place of each of its described forms.

@@ -1,6 +1,7 @@
 """The point at which a bench is linearised: parameters with their priors there, and the units that act."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,14 @@ REACH = (1.0, TOLERANCES)  # prior standard deviations from the prior's mean tha
 def is_parameter(column: str) -> bool:
     """Whether a column is a parameter's, and not a function of a remainder or of an effect's own form."""
     return not column.startswith(("remainder.", "own."))
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a point was, and which units acted there."""
+
+    point: Mapping[str, float]
+    on: frozenset[str]
 
 
 class Point:
@@ -40,6 +49,14 @@ class Point:
         for n, p in self.parameters.items():
             if p.alias is not None:
                 self._beyond.setdefault(p.alias, []).append(n)
+
+    def here(self) -> Place:
+        """Where the point is."""
+        return Place(dict(self.point), frozenset(self.on))
+
+    def go_to(self, place: Place) -> None:
+        """Move the point to where it was once."""
+        self.point, self.on = dict(place.point), set(place.on)
 
     def active(self, unit: Unit) -> list[Variant]:
         """Variants of a unit at the present point."""

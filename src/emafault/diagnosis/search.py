@@ -39,13 +39,14 @@ class Choice:
 
 @dataclass
 class Model:
-    """A set with its log posterior (up to a constant), fitted deviations and their standard deviations."""
+    """A set with its log posterior (up to a constant), fitted deviations and their standard deviations; before it is
+    fitted, the choices alone."""
 
     choices: tuple[Choice, ...]
-    log_posterior: float
-    log_likelihood: float
-    deviations: dict[str, float]
-    spread: dict[str, float]
+    log_posterior: float = 0.0
+    log_likelihood: float = 0.0
+    deviations: dict[str, float] = field(default_factory=dict)
+    spread: dict[str, float] = field(default_factory=dict)
 
     @property
     def units(self) -> tuple[str, ...]:

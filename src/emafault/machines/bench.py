@@ -80,17 +80,17 @@ class MeasuredBench(Bench):
             for model in ranked:
                 if model.log_posterior > ranked[0].log_posterior - NEAR and len(finalists) < most:
                     finalists.setdefault(tuple(u for u in model.units if not u.startswith("remainder:")), model)
-        begun = dict(self.point), set(self.on)
+        begun = self.here()
         reached = []
         for model in finalists.values():
-            self.point, self.on = dict(begun[0]), set(begun[1])
+            self.go_to(begun)
             found = self.settle(replace(model, log_posterior=0.0), steps=SETTLING)
-            reached.append((found.log_posterior, dict(self.point), set(self.on)))
+            reached.append((found.log_posterior, self.here()))
         best = max(range(len(reached)), key=lambda k: reached[k][0])
         if best == 0 or reached[best][0] < reached[0][0] + CLOSE:
-            self.point, self.on = begun
+            self.go_to(begun)
             return False
-        self.point, self.on = reached[best][1:]
+        self.go_to(reached[best][1])
         return True
 
     def move(self, model, normal):

@@ -71,7 +71,7 @@ class Fitted:
         bench = MeasuredBench(self.recorded, self.bench.recordings)
         if choices:
             bench.point, bench.on, bench.sizes = dict(self.bench.point), set(self.bench.on), dict(self.bench.sizes)
-        return bench.settle(Model(choices, 0.0, 0.0, {}, {}), steps=SETTLING).log_likelihood
+        return bench.settle(Model(choices), steps=SETTLING).log_likelihood
 
     def base(self) -> dict[str, float]:
         """Parameters of the recalibrated base model."""

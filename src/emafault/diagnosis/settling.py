@@ -1,0 +1,201 @@
+"""A set at its own optimum: Gauss-Newton steps of the point that are halved where the set fits worse after them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .described import Described
+from .evidence import SETTLED, Normal
+from .normal import NormalEquations
+from .point import Place, is_parameter
+from .search import OTHER_FORM, Model, Search
+
+STEPS = 3  # of a set to its own optimum
+HALVINGS = 6  # of a step after which a set fits worse than before
+FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
+
+
+@dataclass(frozen=True)
+class Began:
+    """Where a step began: the point, and its misfit (nats) with the noise's part and, where that is known, without."""
+
+    point: dict[str, float]
+    misfits: tuple[float, float | None]
+
+    def holds(self, after: tuple[float, float | None], slack: float) -> bool:
+        """Whether the misfit after the step is no larger."""
+        whole, less = self.misfits
+        return after[1] < less + slack if less is not None and after[1] is not None else after[0] < whole + slack
+
+
+@dataclass
+class Inserted:
+    """A fitted set as a model of other recordings: all values, and what stands beside them.
+
+    ``beside``: coefficients of remainders and own forms by column; ``own``: sizes of the units that carry their own
+    form.
+    """
+
+    values: dict[str, float]
+    beside: dict[str, float]
+    own: dict[str, dict[str, float]]
+
+
+def halfway(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+    """The point in the middle of two."""
+    return {n: 0.5 * (one[n] + other[n]) for n in other}
+
+
+class Settling(NormalEquations):
+    """Recordings of one machine, with sets at their own optimum."""
+
+    searching: type[Search] = Search
+    settled = SETTLED
+
+    def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
+        super().__init__(machine, recordings, processes)
+        self.closer: dict[str, float] = {}  # what a closer look took off the log evidence that a secant gave a unit
+        self._inserted: dict[tuple, Inserted] = {}
+
+    @property
+    def described(self) -> tuple[Described, ...]:
+        """Forms that have been proposed."""
+        return self.machine.forms
+
+    def settle(self, model: Model, normal: Normal | None = None, steps: int = STEPS) -> Model:
+        """A set at its own optimum, by Gauss-Newton from the present point, which moves there.
+
+        ``normal`` of a model fitted there saves the first step.
+        """
+        ahead = to_come = np.inf  # log evidence that the last step promised, and that the next one will
+        began: Began | None = None
+        if normal is not None:
+            begun = self.here()
+            if self.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
+                began = Began(dict(self.point), self._misfits(normal, model, True))
+            ahead = to_come = self.move(model, normal)
+            if ahead < self.settled:
+                return model
+            new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun.on}
+            if new:
+                return self._settle_secants(model, new, begun)
+        # on its way a set may be led by a little bias, where it ends it must not
+        for enough, corrected in ((FAR, False), (self.settled, True)):
+            for _ in range(steps):
+                if to_come < enough:
+                    break
+                found, at_point, misfits = self._nearer(model, corrected, began)
+                began, ended = Began(dict(self.point), misfits) if self.on <= set(model.units) else None, began
+                if ended is not None and began is not None and ended.point == began.point:
+                    to_come = 0.0
+                    break
+                before, ahead = ahead, self.move(found, at_point)
+                # steps shrink on at least as they did
+                to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
+            left, to_come = to_come, np.inf
+        if left > FAR and began is not None:  # what the last steps promised they have not held
+            self.point = dict(began.point)
+            found.log_posterior -= ahead
+        return found
+
+    def _nearer(
+        self, model: Model, corrected: bool, began: Began | None
+    ) -> tuple[Model, Normal, tuple[float, float | None]]:
+        """A set fitted at the present point, or nearer to where the last step began if it fits worse here than there,
+        in the end at that point, which is where the point then lies (backtracking; Nocedal and Wright 2006, section
+        3.1); and its misfits there."""
+        for halving in range(HALVINGS + 1):
+            found, at_point = self._fitted(model, corrected)
+            misfits = self._misfits(at_point, found, corrected)
+            if began is None or halving == HALVINGS or began.holds(misfits, self.settled):
+                break
+            last = halving == HALVINGS - 1
+            self.point = dict(began.point) if last else halfway(began.point, self.point)
+        return found, at_point, misfits
+
+    def _misfits(self, normal: Normal, model: Model, corrected: bool) -> tuple[float, float | None]:
+        """Half the squared misfit of a set at the present point (nats), with that of the parameters from their priors,
+        and the same less the noise's part, where it is known.
+
+        Columns beside the point, which the set is linear in, are at their best.
+        """
+        apart = sum((mean / sd) ** 2 for mean, sd, _ in (self.prior(n) for n in normal.names if is_parameter(n)))
+        misfit = 0.5 * float(normal.c + apart) - self.gained_beside(model, normal)
+        return misfit + 0.5 * normal.own, misfit if corrected else None
+
+    def _settle_secants(self, model: Model, new: set[str], begun: Place) -> Model:
+        """A set of which units have just been switched on, at its own optimum, or without them where it was ``begun``,
+        if that is better.
+
+        A secant points the way only: its effect finds its place before anything that a scan proposed or no one has
+        described takes it, or finds none. Faults of the measuring chain stay: beside one that is not in the set no
+        effect finds its place.
+        """
+        proposed = {f.id for f in self.described}
+        kept = [c for c in model.choices if self._kind(c.unit) != "remainder" and c.unit not in proposed]
+        found = self.settle(Model(tuple(kept)))
+        if found.log_posterior >= model.log_posterior:
+            return found
+        there = self.here()
+        self.go_to(begun)
+        less = self.settle(Model(tuple(c for c in kept if c.unit not in new)))
+        if less.log_posterior > found.log_posterior:
+            self.closer |= dict.fromkeys(new, found.log_posterior - less.log_posterior)
+            return less
+        self.go_to(there)
+        return found
+
+    def inserted(self, model: Model, normal: Normal) -> Inserted:
+        """A set at its own optimum, where the point is left as it was; ``normal`` of the present point."""
+        key = model.choices, tuple(sorted(self.point.items()))
+        if key in self._inserted:
+            return self._inserted[key]
+        kept, sizes = self.here(), dict(self.sizes)
+        found = self.settle(model, normal)
+        values = self.values()
+        own = {
+            u: {self.parameters[n].alias or n: d for n, d in amounts.items()}
+            for u, amounts in self.sizes.items()
+            if u in found.units
+        }
+        self.go_to(kept)
+        self.sizes = sizes
+        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
+        self._inserted[key] = Inserted(values, beside, own)
+        return self._inserted[key]
+
+    def _fitted(self, model: Model, corrected: bool = True) -> tuple[Model, Normal]:
+        """A set fitted by the linear model of the present point, and that model; its members' widths stay."""
+        shaped = {u.id for u in self.units if u.on is not None and u.id in self.on}
+        choices = tuple(
+            replace(c, variant=c.variant - c.variant % OTHER_FORM) if c.unit in shaped else c for c in model.choices
+        )
+        this = replace(model, choices=choices)
+        at_point = self.normal(self.linearise(this, corrected=corrected), this)
+        reduced = self.reduce(at_point)
+        search = self.searching(reduced, *self.candidates(reduced))
+        width = {
+            (c.unit, c.variant if (c.unit, c.variant) in search.candidates else c.variant % OTHER_FORM): c.width
+            for c in choices
+        }
+        fixed = {m: w for m, w in width.items() if w in search.candidates[m].widths}
+        return search.fit(tuple(width), fixed), at_point
+
+    def _by_own_variants(self, model: Model) -> Model:
+        """A set that the point has settled at, with the variant of each unit whose variants look alike near off that is
+        best at its own optimum, where the point moves."""
+        alike = {u.id: u for u in self.units if u.alike}
+        for unit in (alike[u] for u in model.units if u in alike):
+            ends = [(model, self.here())]
+            amount = sum(self.point[p.name] for p in unit.parameters)
+            for v, variant in enumerate(unit.variants):
+                if v in [c.variant for c in model.choices if c.unit == unit.id]:
+                    continue
+                self.go_to(ends[0][1])
+                self.point |= {p.name: p.off for p in unit.parameters} | {p.name: amount for p in variant.parameters}
+                other = tuple(replace(c, variant=v) if c.unit == unit.id else c for c in model.choices)
+                ends.append((self.settle(Model(other)), self.here()))
+            model, place = max(ends, key=lambda e: e[0].log_posterior)
+            self.go_to(place)
+        return model
