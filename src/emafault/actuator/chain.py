@@ -146,7 +146,8 @@ class Chain:
             through = smoothed if form == "smoothing" else filtered
             x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
         elif form == "drift":
-            x += entry["at_end"] * (np.arange(len(x)) + 0.5) / len(x)
+            start = entry.get("at_start", 0.0)
+            x += start + (entry["at_end"] - start) * (np.arange(len(x)) + 0.5) / len(x)
 
 
 def _channels(signals: Signals, place: str) -> list[np.ndarray]:

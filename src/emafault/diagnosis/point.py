@@ -73,7 +73,7 @@ class Point:
                     names.append(p.name)
                     if p.alias is not None:
                         aliases[p.name] = p.alias
-        return names, aliases
+        return list(dict.fromkeys(names)), aliases  # variants of a unit may share some
 
     def names_of(self, choice: Choice) -> list[str]:
         """Columns of a unit's variant at the present point."""

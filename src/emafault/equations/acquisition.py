@@ -179,10 +179,20 @@ def _rounding(rec: Signals, p: Point) -> Dual | None:
     return Dual(value, slopes)
 
 
+def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
+    """(sample,) what a channel has too much: an offset of the recording's own, and what grows evenly along it."""
+    out: Dual | float = 0.0
+    offset, drift = (p(f"{kind}_{quantity}.{phase}@{rec.name}") for kind in ("offset", "drift"))
+    if drift.slopes or drift.value:
+        out = drift * (rec.time / rec.time[-1])
+    if offset.slopes or offset.value:
+        out = out + offset * np.ones(rec.size)
+    return out
+
+
 def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
     and gain."""
-    share = rec.time / rec.time[-1]
     rounding = _rounding(rec, p)
     means: list[Dual] = []
     ends: list[Dual] = []
@@ -194,9 +204,8 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     for n, (source, out) in enumerate(((rec.current, means), (at_end, ends))):
         for j in range(3):
             i = undone(p, "current", source[:, j], rate[j][n])
-            drift = p(f"drift_current.{'abc'[j]}@{rec.name}")
             i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
-            i = i - drift * share
+            i = i - drifted(p, "current", "abc"[j], rec)
             if out is means and rounding is not None:
                 i = i - rounding * np.sign(rec.rows_from.current[:, j])
             for q in range(3):

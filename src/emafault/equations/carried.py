@@ -105,9 +105,14 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
         ((_, amount),) = values.items()
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})
     if kind == "drift":
-        own = {name.partition("@")[2]: {"at_end": v} for name, v in values.items()}
-        mean = float(np.mean([v["at_end"] for v in own.values()]))
-        return _rounded({"place": channel, "form": "drift", "at_end": mean, EACH: own})
+        own: dict[str, dict[str, float]] = {}
+        for full, (v, _) in linear.items():
+            entry = own.setdefault(full.partition("@")[2], {"at_end": 0.0})
+            entry["at_end"] += v  # an offset stays
+            if full.startswith("offset"):
+                entry["at_start"] = v
+        mean = {n: float(np.mean([v[n] for v in own.values()])) for n in next(iter(own.values()))}
+        return _rounded({"place": channel, "form": "drift", **mean, EACH: own})
     return None
 
 

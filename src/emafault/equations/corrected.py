@@ -68,7 +68,8 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
     for quantity in ("voltage", "current"):
         for phase in "abc":
             if f"~drift_{quantity}_{phase}" in told:
-                x = values.get(f"drift_{quantity}.{phase}@{name}", 0.0) * share
+                start, grows = (values.get(f"{kind}_{quantity}.{phase}@{name}", 0.0) for kind in ("offset", "drift"))
+                x = start + grows * share
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from ..switches import direction
-from .acquisition import bent, dropped, recorded_late
+from .acquisition import bent, drifted, dropped, recorded_late
 from .commutation import EDGE, LONGEST, REACH, rows_of, sweep
 from .dual import Dual, Number, value_of
 from .point import State, effect_name
@@ -65,11 +65,9 @@ def residuals(state: State) -> dict[str, Dual]:
     """Recorded less predicted voltage (V) of each phase."""
     rec = state.rec
     true = recorded(state, [v + rise for v, rise in zip(voltages(state), state.rise, strict=True)])
-    share = rec.time / rec.time[-1]
     out = {}
     for j, name in enumerate(NAMES):
-        drift = state.p(f"drift_voltage.{'abc'[j]}@{rec.name}")
-        residual = rec.voltage[:, j] - true[j] - drift * share
+        residual = rec.voltage[:, j] - true[j] - drifted(state.p, "voltage", "abc"[j], rec)
         if rec.current_end is None:
             of = averaging(state, j)
             residual = residual.linear(lambda x, of=of: of(x), rec.size)

@@ -163,9 +163,13 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
         out.append(Unit(f"~{kind}_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
     for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
         for j in PER_PHASE:
-            parameters = [Parameter(f"drift_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]
-            drift = Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), [Variant(parameters)], among=6.0)
-            out.append(drift)
+            along, at_start = (
+                [Parameter(f"{kind}_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]
+                for kind in ("drift", "offset")
+            )
+            # within recordings, from one to the next, or both
+            variants = [Variant(along), Variant(at_start), Variant([*at_start, *along])]
+            out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), variants, among=6.0))
     return out
 
 

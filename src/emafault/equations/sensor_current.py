@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .acquisition import bent, recorded_late
+from .acquisition import bent, drifted, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
@@ -17,13 +17,12 @@ def residual(state: State) -> Dual:
     """
     rec, p = state.rec, state.p
     true = np.array([np.asarray(value_of(i)) for i in state.current])
-    share = rec.time / rec.time[-1]
     out = Dual(rec.once(("sum",), lambda: rec.current.sum(axis=1)))
     for j, phase in enumerate("abc"):
         seen = recorded_late(p, "current", Dual(true[j]), rec.size)
         for m in reversed(with_hook("current")):
             seen = _recorded(m, p.of(effect_name(m)), j, seen)
-        seen = seen + p(f"drift_current.{phase}@{rec.name}") * share
+        seen = seen + drifted(p, "current", phase, rec)
         for q, other in enumerate("abc"):
             if q != j:
                 seen = seen + p(f"crosstalk.{phase}{other}") * true[q]

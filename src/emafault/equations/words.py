@@ -111,8 +111,11 @@ def _of_group(group: str, short: str) -> str:
         "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
-        "drift_current": f"drift of the current channel of phase {short}",
-        "drift_voltage": f"drift of the voltage channel of phase {short}",
+        **{
+            f"{kind}_{quantity}": f"{kind} of the {quantity} channel of phase {short}"
+            for kind in ("drift", "offset")
+            for quantity in ("current", "voltage")
+        },
     }
     return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
 
