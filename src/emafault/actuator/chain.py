@@ -24,7 +24,7 @@ RECORDED = {
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
 AFTER_NOISE = ("spikes", "held", "clipping", "adc_step")
-ORDER = ("", "sensor_curve", "drop", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
+ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 
@@ -133,7 +133,7 @@ class Chain:
         return np.mean(shape, axis=1) * true["rotor_speed"]
 
     def _change(self, x: np.ndarray, entry: Mapping[str, Any]) -> None:
-        """Curve, lag, filter or drift of a channel (time,) or (time, phase), in place."""
+        """Curve, gain, lag, filter or drift of a channel (time,) or (time, phase), in place."""
         form, quantity = entry["form"], entry["place"].partition("_")[0]
         if form == "sensor_curve":
             full = self.run["current_limit"] if quantity == "current" else 0.5 * self.run["bus_voltage"]
@@ -145,6 +145,8 @@ class Chain:
         elif form in ("smoothing", "low_pass"):
             through = smoothed if form == "smoothing" else filtered
             x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
+        elif form == "gain":
+            x += entry["gain"] * x
         elif form == "drift":
             start = entry.get("at_start", 0.0)
             x += start + (entry["at_end"] - start) * (np.arange(len(x)) + 0.5) / len(x)

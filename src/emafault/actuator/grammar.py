@@ -42,8 +42,8 @@ ANY, _SMALLEST = (-1e6, 1e6), 1e-6
 #: parameter -> lowest and highest value, unit; without one it has the place's
 PARAMETERS: dict[str, tuple[float, float, str]] = {
     "amplitude": (*ANY, ""), "jump": (*ANY, ""), "at_100_rad_s": (*ANY, ""), "depth": (*ANY, ""), "gain": (*ANY, ""),
-    "at_start": (*ANY, ""), "at_end": (*ANY, ""), "drop": (*ANY, "V"), "turn": (_SMALLEST, 1e6, "A"), "step": (_SMALLEST, 1e6, ""),
-    "level": (_SMALLEST, 1e6, ""),
+    "at_start": (*ANY, ""), "at_end": (*ANY, ""), "drop": (*ANY, "V"), "turn": (_SMALLEST, 1e6, "A"),
+    "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
     "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "lag": (-1.0, 1.0, "recording intervals"),
@@ -59,7 +59,7 @@ SHAPES = {
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
-    "sensor_curve": ("bend",), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
+    "sensor_curve": ("bend",), "gain": ("gain",), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "clipping": ("level",), "adc_step": ("step",),
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
@@ -80,8 +80,8 @@ def forms_at(place: str) -> list[str]:
     quantity, _, phase = place.partition("_")
     phased = quantity in ("voltage", "current")
     only = {
-        "crosstalk": place.startswith("current_"), "sensor_curve": phased, "drop": quantity == "voltage",
-        "drift": phased and phase in PHASES,
+        "crosstalk": place.startswith("current_"), "sensor_curve": phased, "gain": phased,
+        "drop": quantity == "voltage", "drift": phased and phase in PHASES,
     }  # fmt: skip
     return [*SHAPES, *(form for form in OF_CHANNELS if only.get(form, True))]
 

@@ -190,6 +190,16 @@ def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
     return out
 
 
+def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
+    """Factor between a channel's recorded and true signal, of the recording's own."""
+    out: Dual | float = 1.0
+    for of in ("all", phase):
+        gain = p(f"gain_{quantity}.{of}@{rec.name}")
+        if gain.slopes or gain.value:
+            out = out + gain
+    return out
+
+
 def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
     """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
     and gain."""
@@ -213,7 +223,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
                     i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
-            out.append(i)
+            out.append(i / gain_of_its_own(p, "current", "abc"[j], rec))
         # the true ones add up to nothing: what the three say together is less noisy than each alone
         mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
         for j in range(3):

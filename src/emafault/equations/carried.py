@@ -104,6 +104,11 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     if kind == "controller":
         ((_, amount),) = values.items()
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})
+    if kind == "gain":
+        phase = next(iter(linear)).partition(".")[2].partition("@")[0]
+        gains = {full.partition("@")[2]: {"gain": v} for full, (v, _) in linear.items()}
+        place = channel if phase == "all" else f"{channel}_{phase}"
+        return _rounded({"place": place, "form": "gain", **_means(gains), EACH: gains})
     if kind == "drift":
         own: dict[str, dict[str, float]] = {}
         for full, (v, _) in linear.items():
@@ -111,9 +116,13 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
             entry["at_end"] += v  # an offset stays
             if full.startswith("offset"):
                 entry["at_start"] = v
-        mean = {n: float(np.mean([v[n] for v in own.values()])) for n in next(iter(own.values()))}
-        return _rounded({"place": channel, "form": "drift", **mean, EACH: own})
+        return _rounded({"place": channel, "form": "drift", **_means(own), EACH: own})
     return None
+
+
+def _means(own: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """Of what recordings have of their own, by name; all have the same."""
+    return {n: float(np.mean([v[n] for v in own.values()])) for n in next(iter(own.values()))}
 
 
 def entries(verdict: Mapping[str, Any]) -> list[Entry]:

@@ -71,6 +71,9 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
                 start, grows = (values.get(f"{kind}_{quantity}.{phase}@{name}", 0.0) for kind in ("offset", "drift"))
                 x = start + grows * share
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
+        if f"~gain_{quantity}" in told:
+            gain = np.array([sum(values.get(f"gain_{quantity}.{of}@{name}", 0.0) for of in ("all", j)) for j in "abc"])
+            yield f"gain of the {quantity} channels", partial(_over, quantity=quantity, gains=1.0 + gain)
 
 
 def write_corrected(
@@ -94,6 +97,13 @@ def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Rec
     names = ("phase_voltage",) if quantity == "voltage" else ("phase_current", "phase_current_end")
     old = {n: x for n in names if (x := getattr(recording, n)) is not None}
     return replace(recording, **{n: x + bends * x**3 for n, x in old.items()})
+
+
+def _over(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:
+    """``gains`` (phase,) of a channel, recorded over true."""
+    if quantity == "voltage":
+        return replace(recording, phase_voltage=recording.phase_voltage / gains)
+    return _currents(recording, lambda x: x / gains)
 
 
 def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recording:

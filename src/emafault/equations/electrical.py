@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from ..switches import direction
-from .acquisition import bent, drifted, dropped, recorded_late
+from .acquisition import bent, drifted, dropped, gain_of_its_own, recorded_late
 from .commutation import EDGE, LONGEST, REACH, rows_of, sweep
 from .dual import Dual, Number, value_of
 from .point import State, effect_name
@@ -81,6 +81,7 @@ def recorded(state: State, true: list[Dual]) -> list[Dual]:
     true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
+    true = [v * gain_of_its_own(p, "voltage", j, state.rec) for j, v in zip("abc", true, strict=True)]
     bends = [bent(p, "voltage", j, v, a) for j, v in zip("abc", true, strict=True)]
     drops = [dropped(p, j, i) for j, i in zip("abc", rec.current.T, strict=True)]
     return [v - bend + drop for v, bend, drop in zip(true, bends, drops, strict=True)]

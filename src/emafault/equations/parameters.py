@@ -25,6 +25,7 @@ LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling 
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
+GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -169,7 +170,12 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
             )
             # within recordings, from one to the next, or both
             variants = [Variant(along), Variant(at_start), Variant([*at_start, *along])]
-            out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), variants, among=6.0))
+            out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), variants, among=8.0))
+        variants = [
+            Variant([Parameter(f"gain_{quantity}.{of}@{n}", 0.0, 0.0, GAIN, "1") for n in recordings])
+            for of in ("all", *PER_PHASE)
+        ]
+        out.append(Unit(f"~gain_{quantity}", "form", (f"sensor_{quantity}",), variants, among=8.0))
     return out
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .acquisition import bent, drifted, recorded_late
+from .acquisition import bent, drifted, gain_of_its_own, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
@@ -19,7 +19,8 @@ def residual(state: State) -> Dual:
     true = np.array([np.asarray(value_of(i)) for i in state.current])
     out = Dual(rec.once(("sum",), lambda: rec.current.sum(axis=1)))
     for j, phase in enumerate("abc"):
-        seen = recorded_late(p, "current", Dual(true[j]), rec.size)
+        own = gain_of_its_own(p, "current", phase, rec)
+        seen = recorded_late(p, "current", Dual(true[j]) * own, rec.size)
         for m in reversed(with_hook("current")):
             seen = _recorded(m, p.of(effect_name(m)), j, seen)
         seen = seen + drifted(p, "current", phase, rec)

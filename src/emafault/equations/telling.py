@@ -164,6 +164,11 @@ def told_of_chain(
         ends = f"{min(starts):z.2g} to {max(starts):z.2g} {next(iter(units.values()))}"
         also = ", and drifts along it" * (len(starts) < len(linear))
         says = f"the offset of the {name} channel is another one in each recording, {ends}{also}"
+    if kind == "gain":
+        gains, phase = [v for v, _ in linear.values()], next(iter(linear)).partition(".")[2].partition("@")[0]
+        whose = f"{channel}s" if phase == "all" else f"{channel} of phase {phase}"
+        ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %"
+        says, kind = f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift"
     if kind == "lag":
         ((at, (amount, _)),) = linear.items()
         says = f"the {'output position' if name == 'output' else name} channel {LATE[at.rpartition('_')[2]]}"

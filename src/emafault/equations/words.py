@@ -116,8 +116,14 @@ def _of_group(group: str, short: str) -> str:
             for kind in ("drift", "offset")
             for quantity in ("current", "voltage")
         },
+        "gain_current": f"gain of the {_of(short, 'current')}, less one",
+        "gain_voltage": f"gain of the {_of(short, 'voltage')}, less one",
     }
     return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
+
+
+def _of(phase: str, quantity: str) -> str:
+    return f"{quantity}s" if phase == "all" else f"{quantity} of phase {phase}"
 
 
 def _late(way: str) -> str:

@@ -1,9 +1,11 @@
 """Signals that contradict each other or their sensors: what refuses a recording, and what makes one useless."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
@@ -24,6 +26,7 @@ CLIPPED_LEAST = 20
 CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise never repeat
 CLIPPED_SPEED = 8  # samples of the speed, which lies on a lattice, at an extreme that the angle goes beyond
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
+CALM = 5  # samples that a median is taken of
 SPIKE = 10.0  # robust standard deviations of a second difference
 FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
@@ -54,6 +57,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
             raise InputError(f"{path}: {variable} of phase {PHASES[dead[0]]} never changes; the channel is dead")
     refuse_frozen(path, recording, actuator)
     refuse_bus(path, recording, actuator)
+    recording = _without_single_samples(recording)
     theta = recording.rotor_angle - recording.rotor_angle[0]
     travel = float(np.ptp(theta))
     if travel > 1.0:
@@ -91,6 +95,12 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         _refuse_swapped_phases(path, recording, actuator)
         if whole:
             refuse_implausible(path, recording, actuator)
+
+
+def _without_single_samples(recording: Recording) -> Recording:
+    """Signals of the motion less single samples that stand out: a spike is no mistaken sensor."""
+    names = ("rotor_angle", "rotor_speed", "output_position")
+    return replace(recording, **{n: median_filter(getattr(recording, n), CALM, mode="nearest") for n in names})
 
 
 def _follows(wanted: np.ndarray, got: np.ndarray, slopes: tuple[float, float] = OF_SPEED) -> tuple[bool, float, float]:
