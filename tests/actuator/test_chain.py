@@ -64,6 +64,8 @@ def test_channels_faults(true):
     talk = changed(true, place="current_a", form="crosstalk", source="b", gain=0.1)
     np.testing.assert_allclose(talk["phase_current"], 0.1 * np.outer(i[:, 1], [1, 0, 0]), atol=1e-12)
     np.testing.assert_allclose(talk["phase_current_end"][:, 0], 0.1 * true["phase_current_end"][0, :, 1], atol=1e-12)
+    talk = changed(true, place="voltage_c", form="crosstalk", source="b", gain=0.1)["phase_voltage"]
+    np.testing.assert_allclose(talk, 0.1 * np.outer(v[:, 1], [0, 0, 1]), atol=1e-12)
     late = changed(true, place="voltage", form="lag", lag=0.3)["phase_voltage"]
     np.testing.assert_allclose(late[1:], 0.3 * (v[:-1] - v[1:]), atol=1e-12)
     early = changed(true, place="output", form="lag", lag=-1.0)["output_position"]
@@ -84,6 +86,10 @@ def test_channels_faults(true):
     np.testing.assert_allclose(one, less * [0.0, 1.0, 0.0], atol=1e-12)
     drift = changed(true, place="current_c", form="drift", at_end=0.2)["phase_current"][:, 2]
     np.testing.assert_allclose(drift, 0.2 * (np.arange(1000) + 0.5) / 1000, atol=1e-12)
+    level = changed(true, place="current_c", form="drift", at_start=0.1, at_end=0.2)["phase_current"][:, 2]
+    np.testing.assert_allclose(level, 0.1 + 0.1 * (np.arange(1000) + 0.5) / 1000, atol=1e-12)
+    gained = changed(true, place="voltage", form="gain", gain=0.02)["phase_voltage"]
+    np.testing.assert_allclose(gained, 0.02 * v, atol=1e-12)
 
 
 def test_samples(true):
@@ -97,8 +103,8 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "drop", "drift", "clipping", "adc_step", "held",
-        "spikes",
+        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "gain", "drop", "drift", "clipping", "adc_step",
+        "held", "spikes",
     }  # fmt: skip
 
 

@@ -50,6 +50,15 @@ def test_what_wanders_is_a_remainder_unless_a_listed_effect_acts_there():
     assert elsewhere.verdict == "partly" and elsewhere.named == ("gain",)
 
 
+@pytest.mark.parametrize(("rest", "told"), [("remainder:sensor_speed", True), ("remainder:torque", False)])
+def test_a_form_that_is_there_or_left_as_a_remainder_of_its_equation_is_told(rest, told):
+    units = [unit("~drift_speed", "sensor_speed", kind="form"), unit(rest, rest.split(":")[1], kind="remainder")]
+    found = read([model(1.0, "~drift_speed"), model(0.0, rest)], units)
+    assert found.forms == (("~drift_speed",) if told else ())
+    assert 0.7 < found.inclusion["~drift_speed"] < 0.8
+    assert read([model(0.0, "~drift_speed"), model(1.0, rest)], units).forms == ()
+
+
 def log_evidence(tolerances, *hole):
     """Of a calibration effect over no effect, of a unit that many tolerances off, with a hole in its prior or none."""
     within, information = 0.1, 1e5  # of the wide prior

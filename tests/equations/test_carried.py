@@ -132,8 +132,18 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
         ("~lag_voltage", {"lag.voltage_filtered": 0.4}, {"place": "voltage", "form": "low_pass", "delay": 0.4}),
         (
             "~crosstalk_current",
-            {"crosstalk.ab": 0.05},
+            {"crosstalk_current.ab": 0.05},
             {"place": "current_a", "form": "crosstalk", "source": "b", "gain": 0.05},
+        ),
+        (
+            "~crosstalk_voltage",
+            {"crosstalk_voltage.cb": 0.05},
+            {"place": "voltage_c", "form": "crosstalk", "source": "b", "gain": 0.05},
+        ),
+        (
+            "~drift_speed",
+            {"offset_speed.all": 0.5},
+            {"place": "speed", "form": "drift", "at_start": 0.5, "at_end": 0.5},
         ),
         ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
         ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
@@ -149,6 +159,30 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
                 "place": "current_b", "form": "drift", "at_end": 0.2,
                 "recordings": {"one.nc": {"at_end": 0.1}, "two.nc": {"at_end": 0.3}},
             },
+        ),
+        (
+            "~drift_voltage_b",
+            {
+                "offset_voltage.b@one.nc": 0.1, "offset_voltage.b@two.nc": 0.3,
+                "drift_voltage.b@one.nc": 0.2, "drift_voltage.b@two.nc": -0.2,
+            },
+            {
+                "place": "voltage_b", "form": "drift", "at_start": 0.2, "at_end": 0.2,
+                "recordings": {"one.nc": {"at_start": 0.1, "at_end": 0.3}, "two.nc": {"at_start": 0.3, "at_end": 0.1}},
+            },
+        ),
+        (
+            "~gain_current",
+            {"gain_current.all@one.nc": 0.01, "gain_current.all@two.nc": 0.03},
+            {
+                "place": "current", "form": "gain", "gain": 0.02,
+                "recordings": {"one.nc": {"gain": 0.01}, "two.nc": {"gain": 0.03}},
+            },
+        ),
+        (
+            "~gain_voltage",
+            {"gain_voltage.c@one.nc": 0.01},
+            {"place": "voltage_c", "form": "gain", "gain": 0.01, "recordings": {"one.nc": {"gain": 0.01}}},
         ),
     ],
 )  # fmt: skip

@@ -238,6 +238,40 @@ def test_currents_that_lag_are_told(lag):
     assert told["form"] == "lag" and next(iter(told["parameters"].values()))["value"] == pytest.approx(lag, rel=0.1)
 
 
+BY_RECORDING = {
+    "offset of a current": ({"phase_current": (0.006, 0.0), "phase_current_end": (0.006, 0.0)}, 1, "sensor_current"),
+    "gain of the currents": ({"phase_current": (0.0, 0.01), "phase_current_end": (0.0, 0.01)}, None, "sensor_current"),
+    "gain of a voltage": ({"phase_voltage": (0.0, 0.01)}, 2, "sensor_voltage"),
+}
+
+
+@pytest.mark.parametrize("case", BY_RECORDING)
+def test_what_a_channel_has_of_its_own_in_each_recording_is_told_and_undone(case, tmp_path):
+    """Offsets and gains that change with a session, which are the same in a recording, had been told as remainders and
+    as a magnet's temperature."""
+    sizes, phase, equation = BY_RECORDING[case]
+    phases = np.eye(3)[phase] if phase is not None else np.ones(3)
+    true, changed = bench(COGGING), {}
+    for n, (name, r) in enumerate(true.items()):
+        share = np.sin(2.0 * n + 1.0) * phases
+        with_own = {v: getattr(r, v) * (1.0 + gain * share) + offset * share for v, (offset, gain) in sizes.items()}
+        changed[name] = replace(r, **with_own)
+    names = list(changed)
+    found = diagnose("bench", changed, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("drift", equation)
+    assert "another one in each recording" in told["sentence"]
+    assert write_corrected(found, changed, tmp_path / "bench", tmp_path / "new")
+    undone = {name: read_recording(tmp_path / "new" / name) for name in true}
+    for variable in sizes:
+        before, after = (
+            np.sqrt(np.mean([np.mean((getattr(x[n], variable) - getattr(r, variable)) ** 2) for n, r in true.items()]))
+            for x in (changed, undone)
+        )
+        assert after < 0.4 * before
+
+
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
     true = bench(COGGING)
     of_duty = {

@@ -60,7 +60,7 @@ class Chain:
             if entry["form"] in SHAPES:
                 self._add(signals, true, entry, m)
             elif entry["form"] == "crosstalk":
-                source = f"current_{entry['source']}"
+                source = f"{entry['place'].partition('_')[0]}_{entry['source']}"
                 for x, y in zip(_channels(signals, entry["place"]), _channels(true, source), strict=True):
                     x += entry["gain"] * y
             elif entry["form"] == "drop":

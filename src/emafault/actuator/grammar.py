@@ -80,8 +80,8 @@ def forms_at(place: str) -> list[str]:
     quantity, _, phase = place.partition("_")
     phased = quantity in ("voltage", "current")
     only = {
-        "crosstalk": place.startswith("current_"), "sensor_curve": phased, "gain": phased,
-        "drop": quantity == "voltage", "drift": phased and phase in PHASES,
+        "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased,
+        "drop": quantity == "voltage", "drift": phase in PHASES or quantity == "speed",
     }  # fmt: skip
     return [*SHAPES, *(form for form in OF_CHANNELS if only.get(form, True))]
 

@@ -1,6 +1,7 @@
 """From a posterior over sets to names: one rule, an inclusion probability of at least ``NAMED``.
 
-Effects whose inclusions reach it only together, one standing in for the other in the sets, are a group.
+Effects whose inclusions reach it only together, one standing in for the other in the sets, are a group; a form that
+reaches it only together with the undescribed remainder of its equation is told, if it is the likelier.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -92,7 +93,8 @@ def read(
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
     groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})
-    forms = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e) == "form"))
+    present = [e for e, p in inclusion.items() if p >= PRESENT and kind.get(e) == "form"]
+    forms = tuple(sorted(e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
     nothing = max(0.0, empty + settings)  # what is the controller's alone is no gap of the machine
@@ -109,6 +111,16 @@ def read(
     else:
         verdict = "unknown"
     return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, verdict)
+
+
+def _or_left(models: Sequence[Model], weights: Sequence[float], form: str, equations: Sequence[str]) -> float:
+    """Mass of the sets that have a form, or a remainder where it acts, which could be it."""
+
+    def has(units: Sequence[str]) -> bool:
+        left = [u.split(":", 1)[1] for u in units if u.startswith("remainder:")]
+        return form in units or any(_meet(equations, (e,)) for e in left)
+
+    return sum(float(w) for m, w in zip(models, weights, strict=True) if has(m.units))
 
 
 def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, ...], ...]:

@@ -180,14 +180,19 @@ def _rounding(rec: Signals, p: Point) -> Dual | None:
 
 
 def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
-    """(sample,) what a channel has too much: an offset of the recording's own, and what grows evenly along it."""
+    """(sample,) what a channel has too much: an offset, of all or of the recording's own, and what grows along it."""
     out: Dual | float = 0.0
-    offset, drift = (p(f"{kind}_{quantity}.{phase}@{rec.name}") for kind in ("offset", "drift"))
+    always, offset, drift = (p(f"{n}_{quantity}.{phase}{at}") for n, at in _drifting(rec.name))
     if drift.slopes or drift.value:
         out = drift * (rec.time / rec.time[-1])
-    if offset.slopes or offset.value:
-        out = out + offset * np.ones(rec.size)
+    for level in (always, offset):
+        if level.slopes or level.value:
+            out = out + level * np.ones(rec.size)
     return out
+
+
+def _drifting(recording: str) -> tuple[tuple[str, str], ...]:
+    return ("offset", ""), ("offset", f"@{recording}"), ("drift", f"@{recording}")
 
 
 def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
@@ -220,7 +225,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
                 i = i - rounding * np.sign(rec.rows_from.current[:, j])
             for q in range(3):
                 if q != j:
-                    i = i - p(f"crosstalk.{'abc'[j]}{'abc'[q]}") * source[:, q]
+                    i = i - p(f"crosstalk_current.{'abc'[j]}{'abc'[q]}") * source[:, q]
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
             out.append(i / gain_of_its_own(p, "current", "abc"[j], rec))

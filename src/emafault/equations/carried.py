@@ -110,6 +110,9 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
         place = channel if phase == "all" else f"{channel}_{phase}"
         return _rounded({"place": place, "form": "gain", **_means(gains), EACH: gains})
     if kind == "drift":
+        if all("@" not in full for full in linear):
+            ((offset, _),) = linear.values()
+            return _rounded({"place": channel, "form": "drift", "at_start": offset, "at_end": offset})
         own: dict[str, dict[str, float]] = {}
         for full, (v, _) in linear.items():
             entry = own.setdefault(full.partition("@")[2], {"at_end": 0.0})

@@ -61,15 +61,17 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
     if "~drop_voltage" in told:
         drops = np.array([sum(values.get(f"drop.{c}", 0.0) for c in ("voltage", f"voltage_{j}")) for j in "abc"])
         yield "drop of the switches", partial(_less_drop, drops=drops, turn=values["drop.turn"])
-    if "~crosstalk_current" in told:
-        gains = np.array([[values.get(f"crosstalk.{j}{q}", 0.0) if j != q else 0.0 for q in "abc"] for j in "abc"])
-        yield "crosstalk between the currents", partial(_without_crosstalk, gains=gains)
+    for quantity in ("current", "voltage"):
+        if f"~crosstalk_{quantity}" in told:
+            gains = np.array([[values.get(f"crosstalk_{quantity}.{j}{q}", 0.0) for q in "abc"] for j in "abc"])
+            yield f"crosstalk between the {quantity}s", partial(_without_crosstalk, quantity=quantity, gains=gains)
     share = (np.arange(size) + 0.5) / size
+    if "~drift_speed" in told:
+        yield "drift of the speed", partial(_less, channel="speed", x=_drifted(values, "speed", "all", name, share))
     for quantity in ("voltage", "current"):
         for phase in "abc":
             if f"~drift_{quantity}_{phase}" in told:
-                start, grows = (values.get(f"{kind}_{quantity}.{phase}@{name}", 0.0) for kind in ("offset", "drift"))
-                x = start + grows * share
+                x = _drifted(values, quantity, phase, name, share)
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
         if f"~gain_{quantity}" in told:
             gain = np.array([sum(values.get(f"gain_{quantity}.{of}@{name}", 0.0) for of in ("all", j)) for j in "abc"])
@@ -112,7 +114,18 @@ def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recordin
     return replace(recording, phase_voltage=recording.phase_voltage - too_much)
 
 
+def _drifted(values: Mapping[str, float], quantity: str, phase: str, recording: str, share: np.ndarray) -> np.ndarray:
+    """(sample,) what a channel has too much, at a ``share`` of the recording."""
+    always, start, grows = (
+        values.get(f"{kind}_{quantity}.{phase}{at}", 0.0)
+        for kind, at in (("offset", ""), ("offset", f"@{recording}"), ("drift", f"@{recording}"))
+    )
+    return always + start + grows * share
+
+
 def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
+    if channel == "speed":
+        return replace(recording, rotor_speed=recording.rotor_speed - x)
     if channel == "angle":
         return replace(recording, rotor_angle=recording.rotor_angle - x)
     if channel == "output":
@@ -147,7 +160,9 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
     return replace(recording, phase_current=means, phase_current_end=at_end[0] if at_end else None)
 
 
-def _without_crosstalk(recording: Recording, gains: np.ndarray) -> Recording:
+def _without_crosstalk(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:
+    if quantity == "voltage":
+        return replace(recording, phase_voltage=recording.phase_voltage - recording.phase_voltage @ gains.T)
     return _currents(recording, lambda x: x - x @ gains.T)
 
 

@@ -82,9 +82,20 @@ def recorded(state: State, true: list[Dual]) -> list[Dual]:
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
     true = [v * gain_of_its_own(p, "voltage", j, state.rec) for j, v in zip("abc", true, strict=True)]
+    true = [_with_crosstalk(state, j, true) for j in range(3)]
     bends = [bent(p, "voltage", j, v, a) for j, v in zip("abc", true, strict=True)]
     drops = [dropped(p, j, i) for j, i in zip("abc", rec.current.T, strict=True)]
     return [v - bend + drop for v, bend, drop in zip(true, bends, drops, strict=True)]
+
+
+def _with_crosstalk(state: State, j: int, voltages: list[Dual]) -> Dual:
+    """What the channel of phase j records of its voltage and of the others'."""
+    out = voltages[j]
+    for q in (q for q in range(3) if q != j):
+        gain = state.p(f"crosstalk_voltage.{'abc'[j]}{'abc'[q]}")
+        if gain.slopes or gain.value:
+            out = out + gain * voltages[q]
+    return out
 
 
 def usable(state: State, j: int) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What the equations are fitted in: nuisances, effects and faults of the measuring chain, with their priors."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling 
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
+STANDS_OUT = 10.0  # of a channel's noise, for the scale of what it has too much
 GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
@@ -131,8 +132,8 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
     return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
 
 
-def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[Unit]:
-    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift."""
+def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) -> list[Unit]:
+    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift, gain."""
     out = []
     # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
     only = {"speed": ("early",), "angle": ("late", "early")}
@@ -152,8 +153,9 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
         )
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
-    variants = [Variant([Parameter(f"crosstalk.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
-    out.append(Unit("~crosstalk_current", "form", ("sensor_current",), variants))
+    for quantity in ("current", "voltage"):
+        variants = [Variant([Parameter(f"crosstalk_{quantity}.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
+        out.append(Unit(f"~crosstalk_{quantity}", "form", (f"sensor_{quantity}",), variants, among=2.0))
     at = TURN * a.current_limit
     turn = Parameter("drop.turn", at, at, at, "A", vanishes=0.0)
     curves = {"curve": (BEND, "1"), "drop": (DROP * a.bus_voltage, "V")}
@@ -162,20 +164,37 @@ def measuring_chain(a: ActuatorParameters, recordings: Collection[str]) -> list[
         also = [turn] if kind == "drop" else []
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
         out.append(Unit(f"~{kind}_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
-    for quantity, sd, units in (("current", 0.05, "A"), ("voltage", 0.3, "V")):
-        for j in PER_PHASE:
-            along, at_start = (
+    return out + _drifts(recordings)
+
+
+def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
+    """Channels whose offset grows along a recording or is another one in each, or whose gain is.
+
+    A current's offset that is always the same is in the catalogue.
+    """
+    out = []
+    noise = next(iter(recordings.values())).noise
+    for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s")):
+        sd = STANDS_OUT * float(getattr(noise, quantity))
+        phases = PER_PHASE if quantity != "speed" else ("all",)
+        for j in phases:
+            always = Variant([Parameter(f"offset_{quantity}.{j}", 0.0, 0.0, sd, units)])
+            each, along = (
                 [Parameter(f"{kind}_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]
-                for kind in ("drift", "offset")
+                for kind in ("offset", "drift")
             )
-            # within recordings, from one to the next, or both
-            variants = [Variant(along), Variant(at_start), Variant([*at_start, *along])]
-            out.append(Unit(f"~drift_{quantity}_{j}", "form", (f"sensor_{quantity}",), variants, among=8.0))
-        variants = [
-            Variant([Parameter(f"gain_{quantity}.{of}@{n}", 0.0, 0.0, GAIN, "1") for n in recordings])
-            for of in ("all", *PER_PHASE)
-        ]
-        out.append(Unit(f"~gain_{quantity}", "form", (f"sensor_{quantity}",), variants, among=8.0))
+            variants = [Variant(along), Variant(each), Variant([*each, *along])]
+            unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
+            variants += [always] if quantity != "current" else []
+            # evenly over the quantities, then over a quantity's phases and its gain
+            among = 3.0 * (len(phases) + 1 if len(phases) > 1 else 1)
+            out.append(Unit(unit, "form", (f"sensor_{quantity}",), variants, among=among))
+        if len(phases) > 1:
+            gains = [
+                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in recordings])
+                for j in ("all", *phases)
+            ]
+            out.append(Unit(f"~gain_{quantity}", "form", (f"sensor_{quantity}",), gains, among=among))
     return out
 
 

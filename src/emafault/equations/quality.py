@@ -1,7 +1,7 @@
 """What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation
 
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
-from ..io.sensors import cut_off, spikes
+from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {
@@ -17,7 +17,10 @@ CHANNELS = {
     "phase_voltage": ("sensor_voltage", "voltage", "V", "voltage"),
     "bus_voltage": ("bus", "bus voltage", "V", "bus_voltage"),
     "output_position": ("position", "output position", "rad", "output"),
+    "rotor_speed": ("sensor_speed", "speed", "rad/s", "speed"),
+    "rotor_angle": ("sensor_angle", "angle", "rad", "angle"),
 }
+BY_STEPS = ("rotor_speed", "rotor_angle")  # whose steps are an effect of the catalogue, or an encoder's counts
 ROWS = 12  # recordings in the picture of their quality
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
@@ -51,6 +54,11 @@ def seen(recording: Recording) -> dict[str, Channel]:
         if values is not None:
             lost = cut.get(channel, np.zeros((len(values), 1), bool))
             out[channel] = _channel(values.reshape(len(values), -1), lost, channel in SUMMED)
+        if channel in MOTION:
+            found = len(without_outliers(values)[1])
+            out[channel] = replace(out[channel], spikes=found / len(values) if found >= FEWEST_SPIKES else 0.0)
+        if channel in BY_STEPS:
+            out[channel] = replace(out[channel], step=0.0, held=0.0)
     return out
 
 

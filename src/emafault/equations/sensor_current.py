@@ -26,7 +26,7 @@ def residual(state: State) -> Dual:
         seen = seen + drifted(p, "current", phase, rec)
         for q, other in enumerate("abc"):
             if q != j:
-                seen = seen + p(f"crosstalk.{phase}{other}") * true[q]
+                seen = seen + p(f"crosstalk_current.{phase}{other}") * true[q]
         seen = seen - bent(p, "current", phase, true[j], rec.actuator)
         out = out - seen
     return out

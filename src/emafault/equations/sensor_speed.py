@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .acquisition import recorded_late
+from .acquisition import drifted, recorded_late
 from .dual import Dual
 from .point import State, effect_name
 from .signals import Signals, odd
@@ -21,7 +21,8 @@ def residual(state: State) -> Dual:
     """
     rec = state.rec
     exact = recorded_late(state.p, "speed", seen_speed(state, Dual(rec.rate)), rec.size)
-    return rec.speed_recorded - Dual(exact.value, predicted(state).slopes)
+    seen = Dual(exact.value, predicted(state).slopes) + drifted(state.p, "speed", "all", rec)
+    return rec.speed_recorded - seen
 
 
 def predicted(state: State) -> Dual:

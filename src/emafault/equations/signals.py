@@ -13,7 +13,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
-from ..io.sensors import cut_off, without_spikes
+from ..io.sensors import calm_motion, cut_off, without_spikes
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
@@ -53,7 +53,7 @@ class Signals:
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
-        r = recording
+        r = calm_motion(recording)
         lost = np.zeros(len(r.time), bool)
         for cut in cut_off(r).values():
             lost |= binary_dilation(cut.any(axis=1))

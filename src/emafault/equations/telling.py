@@ -160,7 +160,10 @@ def told_of_chain(
             "sentence": f"In the control equation: {CONTROLLER[channel].format(amount)}.",
         }  # fmt: skip
     says = f"{kind} of the {name} channel"
-    if kind == "drift" and (starts := [v for n, (v, _) in linear.items() if n.startswith("offset")]):
+    if kind == "drift" and all("@" not in n for n in linear):
+        ((offset, _),), (unit_of,) = linear.values(), {units[n] for n in linear}
+        says = f"the {name} channel has an offset of {offset:.2g} {unit_of}"
+    elif kind == "drift" and (starts := [v for n, (v, _) in linear.items() if n.startswith("offset")]):
         ends = f"{min(starts):z.2g} to {max(starts):z.2g} {next(iter(units.values()))}"
         also = ", and drifts along it" * (len(starts) < len(linear))
         says = f"the offset of the {name} channel is another one in each recording, {ends}{also}"

@@ -108,13 +108,16 @@ def _of_group(group: str, short: str) -> str:
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
         "lag": f"{'output position' if channel == 'output' else channel} channel {_late(side)}",
-        "crosstalk": f"current of phase {phase} in the channel of phase {short[0]}",
+        **{
+            f"crosstalk_{quantity}": f"{quantity} of phase {phase} in the channel of phase {short[0]}"
+            for quantity in ("current", "voltage")
+        },
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
         **{
-            f"{kind}_{quantity}": f"{kind} of the {quantity} channel of phase {short}"
+            f"{kind}_{quantity}": f"{kind} of the {quantity} channel" + f" of phase {short}" * (short != "all")
             for kind in ("drift", "offset")
-            for quantity in ("current", "voltage")
+            for quantity in ("current", "voltage", "speed")
         },
         "gain_current": f"gain of the {_of(short, 'current')}, less one",
         "gain_voltage": f"gain of the {_of(short, 'voltage')}, less one",

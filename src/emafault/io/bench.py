@@ -15,7 +15,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, shown
 from ..places import kind, refuse_folder
 from .recording import Recording, read_recording, recordings_in
-from .sensors import refuse_mistaken, useless
+from .sensors import calm_motion, refuse_mistaken, useless
 
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
 
@@ -125,6 +125,7 @@ def new_folder(bench: str | Path, folder: str | Path, option: str) -> Path:
 
 def limits(recordings: Mapping[str, Recording], actuator: ActuatorParameters) -> list[dict]:
     """Warnings that limit what can be claimed."""
+    recordings = {n: calm_motion(r) for n, r in recordings.items()}
     out = []
 
     def say(message: str, file: str | None = None, variable: str | None = None) -> None:

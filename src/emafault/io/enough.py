@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from .bench import Bench
 from .recording import VARIABLES, Recording
+from .sensors import without_outliers
 
 SAMPLES = 100_000  # that a diagnosis takes unless told otherwise
 LEAST = 1000  # that are worth a diagnosis
@@ -95,7 +96,8 @@ def _cut(recording: Recording, count: int) -> Recording:
     size = len(recording.time)
     if count >= size:
         return recording
-    moves = int(np.argmax(np.abs(recording.rotor_angle - recording.rotor_angle[0]) > STILL))
+    angle = without_outliers(recording.rotor_angle)[0]
+    moves = int(np.argmax(np.abs(angle - angle[0]) > STILL))
     first = min(max(0, moves - round(REST / recording.interval)), size - count)
     part = slice(first, first + count)
     values = {n: getattr(recording, n) for n in VARIABLES}

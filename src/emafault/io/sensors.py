@@ -5,7 +5,6 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
@@ -26,8 +25,8 @@ CLIPPED_LEAST = 20
 CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise never repeat
 CLIPPED_SPEED = 8  # samples of the speed, which lies on a lattice, at an extreme that the angle goes beyond
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
-CALM = 5  # samples that a median is taken of
-SPIKE = 10.0  # robust standard deviations of a second difference
+MOTION = ("rotor_angle", "rotor_speed", "output_position")
+SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
 FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
@@ -57,7 +56,7 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
             raise InputError(f"{path}: {variable} of phase {PHASES[dead[0]]} never changes; the channel is dead")
     refuse_frozen(path, recording, actuator)
     refuse_bus(path, recording, actuator)
-    recording = _without_single_samples(recording)
+    recording = calm_motion(recording)  # a spike is no mistaken sensor
     theta = recording.rotor_angle - recording.rotor_angle[0]
     travel = float(np.ptp(theta))
     if travel > 1.0:
@@ -97,10 +96,10 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
             refuse_implausible(path, recording, actuator)
 
 
-def _without_single_samples(recording: Recording) -> Recording:
-    """Signals of the motion less single samples that stand out: a spike is no mistaken sensor."""
-    names = ("rotor_angle", "rotor_speed", "output_position")
-    return replace(recording, **{n: median_filter(getattr(recording, n), CALM, mode="nearest") for n in names})
+def calm_motion(recording: Recording) -> Recording:
+    """A recording whose signals of the motion have no spikes."""
+    angle, speed, output = (without_outliers(getattr(recording, n))[0] for n in MOTION)
+    return replace(recording, rotor_angle=angle, rotor_speed=speed, output_position=output)
 
 
 def _follows(wanted: np.ndarray, got: np.ndarray, slopes: tuple[float, float] = OF_SPEED) -> tuple[bool, float, float]:
@@ -215,6 +214,7 @@ def _refuse_swapped_phases(path: str, recording: Recording, actuator: ActuatorPa
 
 def useless(recording: Recording, actuator: ActuatorParameters):
     """Yield (variable, rule) for what makes a recording unusable."""
+    recording = calm_motion(recording)
     theta, dt = recording.rotor_angle, recording.interval
     travel = float(np.ptp(theta))
     command = recording.commanded_position
@@ -322,6 +322,27 @@ def without_spikes(current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     phase = np.argmax(np.abs(current[rows] - mean), axis=1)
     out = current.copy()
     out[rows, phase] = mean[np.arange(len(rows)), phase]
+    return out, rows
+
+
+def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A signal of the motion (sample,) less spikes, with what their neighbours say there; and (spike,) their samples.
+
+    A spike stands out of a cubic through two samples on either side, by more than these differ and the motion bends.
+    """
+    out, rows = values.copy(), np.zeros(0, int)
+    if len(values) < 8:
+        return out, rows
+    x = values
+    between = (4.0 * (x[2:-4] + x[4:-2]) - (x[1:-5] + x[5:-1])) / 6.0  # of samples 3 to -3
+    off = np.abs(x[3:-3] - between)
+    scale = max(float(np.median(off)) / 0.6745, lattice_step(values))
+    second = np.abs(np.diff(x, 2))
+    bends = np.maximum(second[:-4], second[4:])  # of the three samples before, of those after
+    alone = off > 2.0 * np.maximum(bends, np.abs(x[4:-2] - x[2:-4]))
+    if scale > 0.0:
+        rows = 3 + np.flatnonzero((off > SPIKE * scale) & alone)
+    out[rows] = between[rows - 3]
     return out, rows
 
 
