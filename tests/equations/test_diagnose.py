@@ -272,6 +272,30 @@ def test_what_a_channel_has_of_its_own_in_each_recording_is_told_and_undone(case
         assert after < 0.4 * before
 
 
+@pytest.mark.parametrize(
+    ("variable", "of", "form", "equation"),
+    [
+        ("phase_voltage", lambda v: v + 0.01 * v[:, [2, 1, 0]] * [1.0, 0.0, 0.0], "crosstalk", "sensor_voltage"),
+        ("phase_voltage", lambda v: v + [0.0, 0.3, 0.0], "drift", "sensor_voltage"),
+        ("rotor_speed", lambda w: w + 1.5, "drift", "sensor_speed"),
+    ],
+)
+def test_a_fault_of_a_channel_that_is_the_same_in_all_recordings_is_told_and_undone(
+    variable, of, form, equation, tmp_path
+):
+    true = bench(COGGING)
+    faulty = {n: replace(r, **{variable: of(getattr(r, variable))}) for n, r in true.items()}
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = (d for d in found.verdict["discovered"] if d["equation"] != "control")
+    assert (told["form"], told["equation"]) == (form, equation)
+    assert write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")
+    for name, r in true.items():
+        got = getattr(read_recording(tmp_path / "new" / name), variable) - getattr(r, variable)
+        assert np.std(got) + abs(got.mean()) < 0.2 * np.abs(getattr(faulty[name], variable) - getattr(r, variable)).max()
+
+
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
     true = bench(COGGING)
     of_duty = {
@@ -313,6 +337,29 @@ def test_spikes_are_left_out_and_told(cogging):
     assert verdict["which"][0]["effects"] == ["cogging"]
     amplitude, same = (v["which"][0]["parameters"]["a"] for v in (verdict, cogging))
     assert amplitude["value"] == pytest.approx(same["value"], abs=0.2 * (same["high"] - same["low"]))
+
+
+def test_spikes_of_the_motion_are_told_and_replaced(tmp_path):
+    """The control law sums what it sees, the torque takes second differences: three samples had ended in wrong names."""
+    true, spiked = bench(COGGING), {}
+    sizes = {"output_position": 0.05, "rotor_angle": 20.0, "rotor_speed": 100.0}
+    for n, (name, r) in enumerate(true.items()):
+        rng, changed = np.random.default_rng(n), {}
+        for variable, size in sizes.items():
+            changed[variable] = getattr(r, variable).copy()
+            changed[variable][rng.choice(np.arange(1500, 3900, 5), 3, replace=False)] += size * rng.uniform(0.5, 1.0, 3)
+        spiked[name] = replace(r, **changed)
+    names = list(spiked)
+    found = diagnose("bench", spiked, (names[:3], names[3:]), ACTUATOR, NOISE)
+    verdict = found.verdict
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    told = {(d["form"], d["equation"]) for d in verdict["discovered"]}
+    assert told == {("spikes", e) for e in ("position", "sensor_angle", "sensor_speed")}
+    assert "spikes" in write_corrected(found, spiked, tmp_path / "bench", tmp_path / "new")
+    for name, r in true.items():
+        got = read_recording(tmp_path / "new" / name)
+        for variable, size in sizes.items():
+            assert np.abs(getattr(got, variable) - getattr(r, variable)).max() < 0.02 * size
 
 
 def test_names_and_order_of_files_change_nothing(cogging):

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
-from ..io.sensors import without_spikes
+from ..io.sensors import calm_motion, without_spikes
 from ..switches import direction
 from .acquisition import full_range, rates, undone
 from .diagnose import Diagnosed
@@ -24,8 +24,9 @@ OF_THE_CHANNEL = ("frequency", "step_change")
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
     """The recordings less the faults of their measuring chain, and what has been undone.
 
-    Lag, curve, drop, drift, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of the currents
-    are replaced by the mean of their neighbours. What cannot be undone (held samples, converter steps, clipping) stays.
+    Lag, curve, drop, drift, gain, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of currents
+    and motion are replaced by what their neighbours say. What cannot be undone (held samples, converter steps,
+    clipping) stays.
     """
     out, undone = {}, dict[str, None]()
     for name, recording in recordings.items():
@@ -41,7 +42,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
     told = {d["unit"] for d in found.verdict["discovered"]}
     values = found.values
     if "~spikes" in told:
-        yield "spikes of the currents", _without_spikes
+        yield "spikes", _without_spikes
     for form in found.bench.described:
         of_voltage = form.equation.startswith("electrical_") and form.driver == 0 and form.word in OF_THE_CHANNEL
         channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
@@ -174,4 +175,5 @@ def _currents(recording: Recording, of: Callable[[np.ndarray], np.ndarray]) -> R
 
 
 def _without_spikes(recording: Recording) -> Recording:
-    return replace(recording, phase_current=without_spikes(recording.phase_current)[0])
+    calm = calm_motion(recording)
+    return replace(calm, phase_current=without_spikes(recording.phase_current)[0])

@@ -31,6 +31,8 @@ SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 PER_PHASE = ("a", "b", "c")
+#: equations that a channel's faults show in, beside the one that is named after it
+IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",)}
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 #: of what an effect is fitted in that its catalogue does not have
@@ -148,14 +150,12 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) ->
             )
             for way in ways
         ]
-        out.append(
-            Unit(f"~lag_{channel}", "form", (f"sensor_{channel}",), variants, among=5.0, alike=set(MADE) <= set(ways))
-        )
+        out.append(Unit(f"~lag_{channel}", "form", _shows(channel), variants, among=5.0, alike=set(MADE) <= set(ways)))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):
         variants = [Variant([Parameter(f"crosstalk_{quantity}.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
-        out.append(Unit(f"~crosstalk_{quantity}", "form", (f"sensor_{quantity}",), variants, among=2.0))
+        out.append(Unit(f"~crosstalk_{quantity}", "form", _shows(quantity), variants, among=2.0))
     at = TURN * a.current_limit
     turn = Parameter("drop.turn", at, at, at, "A", vanishes=0.0)
     curves = {"curve": (BEND, "1"), "drop": (DROP * a.bus_voltage, "V")}
@@ -163,8 +163,12 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) ->
         of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
         also = [turn] if kind == "drop" else []
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
-        out.append(Unit(f"~{kind}_{channel}", "form", (f"sensor_{channel}",), variants, among=3.0))
+        out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
     return out + _drifts(recordings)
+
+
+def _shows(channel: str) -> tuple[str, ...]:
+    return (f"sensor_{channel}", *IN.get(channel, ()))
 
 
 def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
@@ -188,13 +192,13 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
             variants += [always] if quantity != "current" else []
             # evenly over the quantities, then over a quantity's phases and its gain
             among = 3.0 * (len(phases) + 1 if len(phases) > 1 else 1)
-            out.append(Unit(unit, "form", (f"sensor_{quantity}",), variants, among=among))
+            out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
         if len(phases) > 1:
             gains = [
                 Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in recordings])
                 for j in ("all", *phases)
             ]
-            out.append(Unit(f"~gain_{quantity}", "form", (f"sensor_{quantity}",), gains, among=among))
+            out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
     return out
 
 
