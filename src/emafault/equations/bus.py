@@ -5,6 +5,7 @@ that between two phases while the regulator never switches.
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from .acquisition import recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .saturated import dropped, line_voltage, saturated
@@ -22,6 +23,8 @@ def residual(state: State) -> Dual:
         out = out + m.supply(state.p.of(effect_name(m)))
     for m in with_hook("sag"):
         out = out - m.sag(state.p.of(effect_name(m)), rec, state.bus_current)
+    if rec.bus is not None:
+        out = recorded_late(state.p, "bus_voltage", out, rec.size)
     return measured(state) - out
 
 

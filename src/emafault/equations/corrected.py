@@ -51,7 +51,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name, form.channel), form.values)
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
             yield words, partial(_less, channel=channel, x=x)
-    for quantity in ("voltage", "current", "output", "angle"):
+    for quantity in ("voltage", "current", "output", "angle", "bus_voltage"):
         if f"~lag_{quantity}" in told:
             yield f"lag of the {quantity} channel", partial(_not_late, quantity=quantity, at=Point(values, name, ()))
     for quantity in ("voltage", "current"):
@@ -153,6 +153,8 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
         return replace(recording, output_position=of(recording.output_position)[0])
     if quantity == "angle":
         return replace(recording, rotor_angle=of(recording.rotor_angle)[0])
+    if quantity == "bus_voltage":
+        return replace(recording, bus_voltage=of(recording.bus_voltage)[0])
     if quantity == "voltage":
         return replace(recording, phase_voltage=np.column_stack([of(x)[0] for x in recording.phase_voltage.T]))
     ends = recording.phase_current_end

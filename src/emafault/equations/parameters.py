@@ -32,7 +32,7 @@ AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 PER_PHASE = ("a", "b", "c")
 #: equations that a channel's faults show in, beside the one that is named after it
-IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",)}
+IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",), "bus_voltage": ("bus",)}
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 #: of what an effect is fitted in that its catalogue does not have
@@ -139,7 +139,7 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) ->
     out = []
     # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
     only = {"speed": ("early",), "angle": ("late", "early")}
-    for channel in ("voltage", "current", "output", "speed", "angle"):
+    for channel in ("voltage", "current", "output", "speed", "angle", "bus_voltage"):
         ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
         variants = [
             Variant(
@@ -150,7 +150,7 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) ->
             )
             for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", _shows(channel), variants, among=5.0, alike=set(MADE) <= set(ways)))
+        out.append(Unit(f"~lag_{channel}", "form", _shows(channel), variants, among=6.0, alike=set(MADE) <= set(ways)))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):

@@ -20,6 +20,7 @@ LATE = {
     "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
     "filtered": "is behind a first-order filter with a time constant of {}",
 }  # fmt: skip
+CHANNELS = {"output": "output position", "bus_voltage": "bus voltage"}  # words of those that have others
 CONTROLLER = {
     "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
     "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
@@ -174,7 +175,7 @@ def told_of_chain(
         says, kind = f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift"
     if kind == "lag":
         ((at, (amount, _)),) = linear.items()
-        says = f"the {'output position' if name == 'output' else name} channel {LATE[at.rpartition('_')[2]]}"
+        says = f"the {CHANNELS.get(channel, name)} channel {LATE[at.rpartition('_')[2]]}"
         says = says.format(f"{amount:.2g} intervals")
     return {
         "equation": equation, "along": "time", "form": kind, "parameters": said,

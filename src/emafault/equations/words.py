@@ -2,7 +2,7 @@
 
 from ..diagnosis.described import Described
 from .point import SEEDED
-from .telling import LATE, bare
+from .telling import CHANNELS, LATE, bare
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
@@ -103,11 +103,12 @@ def _of_group(group: str, short: str) -> str:
     if group == "command":
         return {"filter": "filter of the command", "feedforward": "feed-forward of the command's speed"}[short]
     channel, _, side = short.partition("_")
+    late = short.rpartition("_")[0]
     chain = {
         "skew": f"{short} channel is sampled late by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
-        "lag": f"{'output position' if channel == 'output' else channel} channel {_late(side)}",
+        "lag": f"{CHANNELS.get(late, late)} channel {_late(short.rpartition('_')[2])}",
         **{
             f"crosstalk_{quantity}": f"{quantity} of phase {phase} in the channel of phase {short[0]}"
             for quantity in ("current", "voltage")
