@@ -113,7 +113,7 @@ def read(
     return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, verdict)
 
 
-def _or_left(models: Sequence[Model], weights: Sequence[float], form: str, equations: Sequence[str]) -> float:
+def _or_left(models: Sequence[Model], weights: Iterable[float], form: str, equations: Sequence[str]) -> float:
     """Mass of the sets that have a form, or a remainder where it acts, which could be it."""
 
     def has(units: Sequence[str]) -> bool:

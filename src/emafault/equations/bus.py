@@ -24,7 +24,7 @@ def residual(state: State) -> Dual:
     for m in with_hook("sag"):
         out = out - m.sag(state.p.of(effect_name(m)), rec, state.bus_current)
     if rec.bus is not None:
-        out = recorded_late(state.p, "bus_voltage", out, rec.size)
+        out = recorded_late(state.p, "bus_voltage", out + np.zeros(rec.size), rec.size)
     return measured(state) - out
 
 

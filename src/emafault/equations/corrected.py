@@ -154,7 +154,8 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
     if quantity == "angle":
         return replace(recording, rotor_angle=of(recording.rotor_angle)[0])
     if quantity == "bus_voltage":
-        return replace(recording, bus_voltage=of(recording.bus_voltage)[0])
+        bus = recording.bus_voltage
+        return recording if bus is None else replace(recording, bus_voltage=of(bus)[0])
     if quantity == "voltage":
         return replace(recording, phase_voltage=np.column_stack([of(x)[0] for x in recording.phase_voltage.T]))
     ends = recording.phase_current_end
