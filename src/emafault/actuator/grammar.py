@@ -81,7 +81,7 @@ def forms_at(place: str) -> list[str]:
     phased = quantity in ("voltage", "current")
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased,
-        "drop": quantity == "voltage", "drift": phase in PHASES or quantity == "speed",
+        "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output"),
     }  # fmt: skip
     return [*SHAPES, *(form for form in OF_CHANNELS if only.get(form, True))]
 

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.commands import with_corners
 from ..first_order import filtered
 from . import commutation, position
-from .acquisition import through
+from .acquisition import drifted, through
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -36,7 +36,9 @@ def residual(state: State) -> Dual:
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
     shaft = position.shaft_angle(state)
-    output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
+    # an offset is the recording's alone: the controller would have driven its own to nothing before it
+    seen_output = rec.output - drifted(p, "output", "all", rec)
+    output = shaft + (seen_output - shaft).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
     beyond = (rec.speed_recorded - model).linear(lambda x: _averaged(x, h), rec.size)
     # rounding is the recording's alone, and no more than a step

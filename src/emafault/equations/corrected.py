@@ -67,8 +67,12 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             gains = np.array([[values.get(f"crosstalk_{quantity}.{j}{q}", 0.0) for q in "abc"] for j in "abc"])
             yield f"crosstalk between the {quantity}s", partial(_without_crosstalk, quantity=quantity, gains=gains)
     share = (np.arange(size) + 0.5) / size
-    if "~drift_speed" in told:
-        yield "drift of the speed", partial(_less, channel="speed", x=_drifted(values, "speed", "all", name, share))
+    if "~ambient" in told:
+        yield "ambient temperature", partial(_warmer, by=values.get(f"ambient.start@{name}", 0.0))
+    for quantity in ("speed", "output"):
+        if f"~drift_{quantity}" in told:
+            x = _drifted(values, quantity, "all", name, share)
+            yield f"drift of the {quantity}", partial(_less, channel=quantity, x=x)
     for quantity in ("voltage", "current"):
         for phase in "abc":
             if f"~drift_{quantity}_{phase}" in told:
@@ -93,6 +97,10 @@ def write_corrected(
     for name, recording in out.items():
         write_recording(folder / name, recording)
     return undone
+
+
+def _warmer(recording: Recording, by: float) -> Recording:
+    return replace(recording, ambient_temperature=recording.ambient_temperature + by)
 
 
 def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Recording:

@@ -25,7 +25,9 @@ LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling 
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
-STANDS_OUT = 10.0  # of a channel's noise, for the scale of what it has too much
+STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
+FAR_OUT = 100.0  # of a channel's noise, for the scale of its offset
+WARM = 30.0  # K, by which a machine may not have the recorded ambient temperature
 GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
@@ -178,9 +180,9 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
     """
     out = []
     noise = next(iter(recordings.values())).noise
-    for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s")):
-        sd = STANDS_OUT * float(getattr(noise, quantity))
-        phases = PER_PHASE if quantity != "speed" else ("all",)
+    for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s"), ("output", "rad")):
+        sd = FAR_OUT * float(getattr(noise, {"output": "position"}.get(quantity, quantity)))
+        phases = PER_PHASE if quantity in ("current", "voltage") else ("all",)
         for j in phases:
             always = Variant([Parameter(f"offset_{quantity}.{j}", 0.0, 0.0, sd, units)])
             each, along = (
@@ -191,7 +193,7 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
             unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
             variants += [always] if quantity != "current" else []
             # evenly over the quantities, then over a quantity's phases and its gain
-            among = 3.0 * (len(phases) + 1 if len(phases) > 1 else 1)
+            among = 4.0 * (len(phases) + 1 if len(phases) > 1 else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
         if len(phases) > 1:
             gains = [
@@ -199,6 +201,9 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
                 for j in ("all", *phases)
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
+    # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere
+    warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K", alias=f"dT@{n}") for n in recordings]
+    out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=4.0))
     return out
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .acquisition import recorded_late
+from .acquisition import drifted, recorded_late
 from .dual import Dual, value_of
 from .flexible import through_play
 from .point import State, effect_name
@@ -26,7 +26,8 @@ def shaft_angle(state: State) -> Dual:
 def residual(state: State) -> Dual:
     """Recorded less predicted angle of the user shaft (rad)."""
     shaft = shaft_angle(state) + state.p(f"output_zero@{state.rec.name}")
-    return state.rec.output - recorded_late(state.p, "output", shaft + _rounding(state, shaft), state.rec.size)
+    seen = recorded_late(state.p, "output", shaft + _rounding(state, shaft), state.rec.size)
+    return state.rec.output - (seen + drifted(state.p, "output", "all", state.rec))
 
 
 def rounding_names(recording: str) -> list[tuple[str, int, Callable]]:

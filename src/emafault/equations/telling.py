@@ -160,14 +160,21 @@ def told_of_chain(
             "equation": equation, "along": "time", "form": kind, "parameters": said,
             "sentence": f"In the control equation: {CONTROLLER[channel].format(amount)}.",
         }  # fmt: skip
-    says = f"{kind} of the {name} channel"
+    if unit == "~ambient":
+        above = [v for v, _ in linear.values()]
+        ends = f"{min(above):.2g} to {max(above):.2g} K above the recorded ambient temperature"
+        return {
+            "equation": equation, "along": "temperature", "form": "drift", "parameters": said,
+            "sentence": f"In the measuring chain: at the start of the recordings the machine is {ends}.",
+        }  # fmt: skip
+    says = f"{kind} of the {CHANNELS.get(channel, name)} channel"
     if kind == "drift" and all("@" not in n for n in linear):
         ((offset, _),), (unit_of,) = linear.values(), {units[n] for n in linear}
-        says = f"the {name} channel has an offset of {offset:.2g} {unit_of}"
+        says = f"the {CHANNELS.get(channel, name)} channel has an offset of {offset:.2g} {unit_of}"
     elif kind == "drift" and (starts := [v for n, (v, _) in linear.items() if n.startswith("offset")]):
         ends = f"{min(starts):z.2g} to {max(starts):z.2g} {next(iter(units.values()))}"
         also = ", and drifts along it" * (len(starts) < len(linear))
-        says = f"the offset of the {name} channel is another one in each recording, {ends}{also}"
+        says = f"the offset of the {CHANNELS.get(channel, name)} channel is another one in each recording, {ends}{also}"
     if kind == "gain":
         gains, phase = [v for v, _ in linear.values()], next(iter(linear)).partition(".")[2].partition("@")[0]
         whose = f"{channel}s" if phase == "all" else f"{channel} of phase {phase}"

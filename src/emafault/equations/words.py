@@ -105,6 +105,7 @@ def _of_group(group: str, short: str) -> str:
     channel, _, side = short.partition("_")
     late = short.rpartition("_")[0]
     chain = {
+        "ambient": "temperature at the start above the recorded ambient one",
         "skew": f"{short} channel is sampled late by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
@@ -116,9 +117,9 @@ def _of_group(group: str, short: str) -> str:
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
         **{
-            f"{kind}_{quantity}": f"{kind} of the {quantity} channel" + f" of phase {short}" * (short != "all")
+            f"{kind}_{q}": f"{kind} of the {CHANNELS.get(q, q)} channel" + f" of phase {short}" * (short != "all")
             for kind in ("drift", "offset")
-            for quantity in ("current", "voltage", "speed")
+            for q in ("current", "voltage", "speed", "output")
         },
         "gain_current": f"gain of the {_of(short, 'current')}, less one",
         "gain_voltage": f"gain of the {_of(short, 'voltage')}, less one",
