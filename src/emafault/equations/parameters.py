@@ -202,7 +202,7 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
     # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere
-    warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K", alias=f"dT@{n}") for n in recordings]
+    warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K") for n in recordings]
     out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=4.0))
     return out
 

@@ -15,7 +15,7 @@ PLATEAU = np.pi / 6.0  # electrical rad, where the commutation switches a phase 
 def fill(state: State) -> None:
     """Compute them, in the order in which they depend on one another."""
     rec, p = state.rec, state.p
-    state.dT = p.own("dT") + rec.dT_measured
+    state.dT = p.own("dT") + p(f"ambient.start@{rec.name}") + rec.dT_measured
     # the terms of the effects see the recording
     rec.dT = state.dT
     scale = _product(state, "inertia")

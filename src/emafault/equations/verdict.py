@@ -270,8 +270,9 @@ def _faults(fitted: Fitted, recordings: Mapping[str, Recording]) -> dict[str, di
             parts = [component if component != "dT" and rec.health == "unknown" else f"{component}@{name}"]
             if component != "dT" and rec.health == "seeded":
                 parts.append(SEEDED + component)
-            also = [n for n, p in bench.parameters.items() if p.alias in parts]
-            k = [index[n] for n in (*parts, *also) if n in index]
+            if component == "dT":
+                parts.append(f"ambient.start@{name}")
+            k = [index[n] for n in parts if n in index]
             sd = float(np.sqrt(covariance[np.ix_(k, k)].sum()))
             for stage, values in (("before", fitted.before), ("after", fitted.values)):
                 value = float(sum(values[n] for n in parts)) + shift
