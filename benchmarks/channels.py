@@ -1,30 +1,33 @@
-"""Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's, filtered or computed of
-duty cycles, or whose controller does more with its command.
+"""Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's, filtered, computed of
+duty cycles or another in each recording, or whose controller does more with its command.
 
     python benchmarks/channels.py [--only "encoder of 4096 counts" ...]
 
 Six recordings of 0.6 s of one unit a bench, once without effect, once with a contact resistance in phase a, once with
-Stribeck friction. Printed for each: what was named, and what was told beside it and the steps or filters themselves.
+Stribeck friction. Printed for each: what was named, what was told beside it and what the channels are, and what of that was not.
 All noise is that of voltages, currents, speed and positions; the sensors' filter that of voltages, currents and speed.
 """
 
 import argparse
 import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from diagnosis import Case, simulate_bench
 from emafault import config
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
+from emafault.io.recording import Recording, read_recording, write_recording
 
 EFFECTS = {
     "none": (), "contact_resistance": ("effects.contact_resistance.R_x_a=0.04",),
     "stribeck": ("effects.stribeck.a=0.02",),
 }  # fmt: skip
 SPEC = config.diagnosis_spec(config.compose())
-THEMSELVES = ("adc_step", "lag", "sensor_curve", "controller")
-TRUE = {"sensors' filter of 5 kHz": ("speed_latency",)}  # what a channel is, of the listed effects
 NOISY = ("voltage", "current", "current_end", "speed", "angle", "position")
 
 
@@ -43,28 +46,101 @@ def entry(place: str, form: str, **numbers: float) -> tuple[str, ...]:
     return (f"unlisted=[{{place: {place}, form: {form}, {', '.join(f'{n}: {x:g}' for n, x in numbers.items())}}}]",)
 
 
+@dataclass(frozen=True)
+class Channel:
+    """What a bench's channels or controller are like.
+
+    ``itself``: form and equation that it is told as; ``listed``: what it is of the catalogue; ``change``: of a
+    recording and its number, after the simulation.
+    """
+
+    overrides: tuple[str, ...] = ()
+    itself: tuple[str, ...] = ()
+    listed: tuple[str, ...] = ()
+    change: Callable[[Recording, int], Recording] | None = None
+
+
+def changed(*itself: str, **of: Callable[[np.ndarray, int], np.ndarray]) -> Channel:
+    """Channels that are a function of themselves and the recording's number."""
+    return Channel(
+        itself=itself,
+        change=lambda r, n: replace(r, **{name: f(getattr(r, name), n) for name, f in of.items()}),
+    )
+
+
+def each(n: int) -> float:
+    """Another number in each recording, within one."""
+    return float(np.sin(2.0 * n + 1.0))
+
+
+def spiked(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    """Three samples of a signal that stand out."""
+
+    def of(x: np.ndarray, n: int) -> np.ndarray:
+        rng, out = np.random.default_rng(n), x.copy()
+        out[rng.choice(np.arange(10, len(x) - 10, 5), 3, replace=False)] += size * rng.uniform(0.5, 1.0, 3)
+        return out
+
+    return of
+
+
+def plus_on_b(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    return lambda x, n: x + size * each(n) * np.array([0.0, 1.0, 0.0])
+
+
+def times(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    return lambda x, n: x * (1.0 + size * each(n))
+
+
 CHANNELS = {
-    "currents in steps of 20 mA": in_steps("current", 0.02),
-    "currents in steps of 50 mA": in_steps("current", 0.05),
-    "voltages in steps of 0.1 V": in_steps("voltage", 0.1),
-    "bus voltage in steps of 0.1 V": in_steps("bus_voltage", 0.1),
-    "encoder of 4096 counts": in_steps("angle", 1.534e-3),
-    "output in counts of 0.1 mrad": in_steps("output", 1e-4),
-    "all noise a tenth": noisier(0.1),
-    "all noise five times": noisier(5.0),
-    "all noise ten times": noisier(10.0),
-    "voltages' noise ten times": noisier(10.0, "voltage"),
-    "speed's noise ten times": noisier(10.0, "speed"),
-    "angle's noise ten times": noisier(10.0, "angle"),
-    "currents late by half an interval": entry("current", "lag", lag=0.5),
-    "angle late by half an interval": entry("angle", "lag", lag=0.5),
-    "currents smoothed": entry("current", "smoothing", delay=0.4),
-    "voltages smoothed": entry("voltage", "smoothing", delay=0.4),
-    "voltages of duty cycles": entry("voltage", "drop", drop=0.7, turn=0.1),
-    "sensors' filter of 5 kHz": ("recording.filter={kind: first_order, cutoff: 5000, before_noise: true}",),
-    "filter of the command": entry("command", "command_filter", time_constant=0.005),
-    "feed-forward": entry("command", "feedforward", gain=0.5),
-}
+    "currents in steps of 20 mA": Channel(in_steps("current", 0.02), ("adc_step in sensor_current",)),
+    "currents in steps of 50 mA": Channel(in_steps("current", 0.05), ("adc_step in sensor_current",)),
+    "voltages in steps of 0.1 V": Channel(in_steps("voltage", 0.1), ("adc_step in sensor_voltage",)),
+    "bus voltage in steps of 0.1 V": Channel(in_steps("bus_voltage", 0.1), ("adc_step in bus",)),
+    "encoder of 4096 counts": Channel(in_steps("angle", 1.534e-3)),
+    "output in counts of 0.1 mrad": Channel(in_steps("output", 1e-4), ("adc_step in position",)),
+    "all noise a tenth": Channel(noisier(0.1)),
+    "all noise five times": Channel(noisier(5.0)),
+    "all noise ten times": Channel(noisier(10.0)),
+    "voltages' noise ten times": Channel(noisier(10.0, "voltage")),
+    "speed's noise ten times": Channel(noisier(10.0, "speed")),
+    "angle's noise ten times": Channel(noisier(10.0, "angle")),
+    "currents late by half an interval": Channel(entry("current", "lag", lag=0.5), ("lag in sensor_current",)),
+    "angle late by half an interval": Channel(entry("angle", "lag", lag=0.5), ("lag in sensor_angle",)),
+    "currents smoothed": Channel(entry("current", "smoothing", delay=0.4), ("lag in sensor_current",)),
+    "voltages smoothed": Channel(entry("voltage", "smoothing", delay=0.4), ("lag in sensor_voltage",)),
+    "voltages of duty cycles": Channel(
+        entry("voltage", "drop", drop=0.7, turn=0.1), ("sensor_curve in sensor_voltage",)
+    ),
+    "sensors' filter of 5 kHz": Channel(
+        ("recording.filter={kind: first_order, cutoff: 5000, before_noise: true}",),
+        ("lag in sensor_current", "lag in sensor_voltage"),
+        listed=("speed_latency",),
+    ),
+    "filter of the command": Channel(
+        entry("command", "command_filter", time_constant=0.005), ("controller in control",)
+    ),
+    "feed-forward": Channel(entry("command", "feedforward", gain=0.5), ("controller in control",)),
+    "offset of a current by recording": changed(
+        "drift in sensor_current", phase_current=plus_on_b(0.02), phase_current_end=plus_on_b(0.02)
+    ),
+    "gain of the currents by recording": changed(
+        "drift in sensor_current", phase_current=times(0.01), phase_current_end=times(0.01)
+    ),
+    "gain of the voltages by recording": changed("drift in sensor_voltage", phase_voltage=times(0.01)),
+    "voltage of phase b in that of a": changed(
+        "crosstalk in sensor_voltage", phase_voltage=lambda v, n: v + 0.01 * np.outer(v[:, 1], [1.0, 0.0, 0.0])
+    ),
+    "offset of the speed": changed("drift in sensor_speed", rotor_speed=lambda w, n: w + 0.8),
+    "zero of the output position": changed("drift in sensor_output", output_position=lambda x, n: x + 8e-4),
+    "spikes of the motion": changed(
+        "spikes in position", "spikes in sensor_speed", "spikes in sensor_angle",
+        output_position=spiked(0.05), rotor_speed=spiked(100.0), rotor_angle=spiked(20.0),
+    ),
+    "machine warm of motions before": changed(
+        "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
+    ),
+}  # fmt: skip
 
 
 def main() -> None:
@@ -78,17 +154,23 @@ def main() -> None:
             for effect, overrides in EFFECTS.items():
                 folder = Path(scratch) / f"{channel} {effect}"
                 folder.mkdir()
-                simulate_bench(folder, Case(6, 0.6, (*overrides, *CHANNELS[channel])))
+                this = CHANNELS[channel]
+                simulate_bench(folder, Case(6, 0.6, (*overrides, *this.overrides)))
+                for n, file in enumerate(sorted(folder.iterdir()) if this.change else ()):
+                    write_recording(file, this.change(read_recording(file), n))
                 verdict = diagnose_bench(read_bench(folder, ActuatorParameters(**SPEC["actuator"])), SPEC).verdict
                 named = verdict["which"][0]["effects"]
-                told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"] if d["form"] not in THEMSELVES]
-                wanted = {*([] if effect == "none" else [effect]), *TRUE.get(channel, ())}
+                told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"]]
+                lacking = [t for t in this.itself if t not in told]
+                told = [t for t in told if t not in this.itself]
+                wanted = {*([] if effect == "none" else [effect]), *this.listed}
                 count, right = count + 1, right + (set(named) == wanted)
-                clean += not told
+                clean += not told and not lacking
                 beside = f"; beside it {', '.join(told)}" if told else ""
+                beside += f"; not told: {', '.join(lacking)}" if lacking else ""
                 p = verdict["which"][0]["probability"]
                 print(f"{channel}, {effect}: {' + '.join(named) or 'none'} ({p:.2f}){beside}", flush=True)
-    print(f"{right} of {count} right, nothing else told in {clean}")
+    print(f"{right} of {count} right, all that the channels are told and nothing else in {clean}")
 
 
 if __name__ == "__main__":
