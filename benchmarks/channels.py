@@ -4,8 +4,9 @@ duty cycles or another in each recording, or whose controller does more with its
     python benchmarks/channels.py [--only "encoder of 4096 counts" ...]
 
 Six recordings of 0.6 s of one unit a bench, once without effect, once with a contact resistance in phase a, once with
-Stribeck friction. Printed for each: what was named, what was told beside it and what the channels are, and what of that was not.
-All noise is that of voltages, currents, speed and positions; the sensors' filter that of voltages, currents and speed.
+Stribeck friction. Printed for each: what was named, what was told beside it and what the channels are, and what of
+that was not. All noise is that of voltages, currents, speed and positions; the sensors' filter that of voltages,
+currents and speed.
 """
 
 import argparse

@@ -293,7 +293,9 @@ def test_a_fault_of_a_channel_that_is_the_same_in_all_recordings_is_told_and_und
     assert write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")
     for name, r in true.items():
         got = getattr(read_recording(tmp_path / "new" / name), variable) - getattr(r, variable)
-        assert np.std(got) + abs(got.mean()) < 0.2 * np.abs(getattr(faulty[name], variable) - getattr(r, variable)).max()
+        assert (
+            np.std(got) + abs(got.mean()) < 0.2 * np.abs(getattr(faulty[name], variable) - getattr(r, variable)).max()
+        )
 
 
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):

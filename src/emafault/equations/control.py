@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.commands import with_corners
 from ..first_order import filtered
 from . import commutation, position
-from .acquisition import drifted, through
+from .acquisition import through
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -36,9 +36,7 @@ def residual(state: State) -> Dual:
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
     shaft = position.shaft_angle(state)
-    # an offset is the recording's alone: the controller would have driven its own to nothing before it
-    seen_output = rec.output - drifted(p, "output", "all", rec)
-    output = shaft + (seen_output - shaft).linear(lambda x: _averaged(x, h), rec.size)
+    output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
     beyond = (rec.speed_recorded - model).linear(lambda x: _averaged(x, h), rec.size)
     # rounding is the recording's alone, and no more than a step
@@ -52,7 +50,8 @@ def residual(state: State) -> Dual:
     wanted = wanted + p("command.feedforward") * (a.gear_ratio * rec.once(("command_rate",), lambda: _rate(rec, lead)))
     # the whole law through the average that the angle's rate is taken over, so that no side of it is smoother
     asked = clip(wanted, p("controller.speed_limit")).linear(lambda x: _calmed(x, h), rec.size)
-    error = asked - seen.linear(lambda x: _centred(x, h, lead), rec.size)
+    # an offset of a recorded speed or position may be the recording's alone
+    error = asked - seen.linear(lambda x: _centred(x, h, lead), rec.size) + p(f"controller.bias@{rec.name}")
     # rows are changes where no limit is reached: where the integral rests elsewhere does not show in them. It holds the
     # present sample too, which makes up for the time that a demand is in force
     integral = error.linear(lambda x: np.cumsum(x) * h + (lead - 0.5 * h) * x, rec.size)

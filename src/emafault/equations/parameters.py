@@ -82,6 +82,8 @@ def nuisances(
         out[f"output_zero@{name}"] = Parameter(f"output_zero@{name}", 0.0, 0.0, zero, "rad")
         if rec.zero_error > 0.0:
             out[f"zero@{name}"] = Parameter(f"zero@{name}", 0.0, 0.0, rec.zero_error, "rad")
+        full = f"controller.bias@{name}"
+        out[full] = Parameter(full, 0.0, 0.0, FAR_OUT * rec.noise.speed, "rad/s")
         full = f"controller.timing@{name}"
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
         for full, k, _ in position.rounding_names(name) if rec.output_step > 0.0 else ():

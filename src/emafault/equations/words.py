@@ -16,6 +16,7 @@ CONTROLLER = {
     "commutation_slope": "commutation time, increase per ampere",
     "commutation_speed": "commutation time, increase at the speed at which the back-EMF is half the bus voltage",
     "commutation_power": "commutation time, increase per ampere at that speed",
+    "bias": "offset of the speed that the controller compares, against the recorded ones",
     "timing": "delay of the sampled demand against the recording",
 }  # fmt: skip
 #: of the catalogue and of what an effect is fitted in, by effect; "{}" is a phase
