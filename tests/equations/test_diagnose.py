@@ -276,7 +276,7 @@ def test_what_a_channel_has_of_its_own_in_each_recording_is_told_and_undone(case
     ("variable", "of", "form", "equation"),
     [
         ("phase_voltage", lambda v: v + 0.01 * v[:, [2, 1, 0]] * [1.0, 0.0, 0.0], "crosstalk", "sensor_voltage"),
-        ("phase_voltage", lambda v: v + [0.0, 0.3, 0.0], "drift", "sensor_voltage"),
+        ("phase_voltage", lambda v: v + np.array([0.0, 0.3, 0.0]), "drift", "sensor_voltage"),
         ("rotor_speed", lambda w: w + 1.5, "drift", "sensor_speed"),
     ],
 )
@@ -292,10 +292,9 @@ def test_a_fault_of_a_channel_that_is_the_same_in_all_recordings_is_told_and_und
     assert (told["form"], told["equation"]) == (form, equation)
     assert write_corrected(found, faulty, tmp_path / "bench", tmp_path / "new")
     for name, r in true.items():
-        got = getattr(read_recording(tmp_path / "new" / name), variable) - getattr(r, variable)
-        assert (
-            np.std(got) + abs(got.mean()) < 0.2 * np.abs(getattr(faulty[name], variable) - getattr(r, variable)).max()
-        )
+        undone = read_recording(tmp_path / "new" / name)
+        after, before = (getattr(x, variable) - getattr(r, variable) for x in (undone, faulty[name]))
+        assert np.std(after) + abs(after.mean()) < 0.2 * np.abs(before).max()
 
 
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
@@ -342,7 +341,7 @@ def test_spikes_are_left_out_and_told(cogging):
 
 
 def test_spikes_of_the_motion_are_told_and_replaced(tmp_path):
-    """The control law sums what it sees, the torque takes second differences: three samples had ended in wrong names."""
+    """The control law sums what it sees, the torque takes second differences: three samples had been wrong names."""
     true, spiked = bench(COGGING), {}
     sizes = {"output_position": 0.05, "rotor_angle": 20.0, "rotor_speed": 100.0}
     for n, (name, r) in enumerate(true.items()):
