@@ -132,10 +132,10 @@ class ReferenceActuator:
         rec = self._noisy(name) if disturbed else self.recordings[name]
         late = [n for n in LATE_ANGLE if wanted is None or n in wanted]
         less = dict(less or {})
-        lag = sum(sign * values.get(n, 0.0) for n, sign in LATE_ANGLE.items())
-        turned = np.gradient(self.recordings[name].angle) if late or lag else None  # in an interval (rad)
-        if turned is not None and lag:
-            less["angle"] = less.get("angle", 0.0) - lag * turned
+        lags = {n: values.get(n, 0.0) for n in LATE_ANGLE}
+        turned = _turned(self.recordings[name].angle) if late or any(lags.values()) else None
+        if turned is not None and any(lags.values()):
+            less["angle"] = less.get("angle", 0.0) - sum(_ahead(n, x) @ turned for n, x in lags.items())
         blocks = self._recording(values, _less(rec, less), wanted)
         if turned is not None and late:
             self._add_late_angle(blocks, values, turned, late, less)
@@ -150,17 +150,18 @@ class ReferenceActuator:
         names: Sequence[str],
         less: Mapping[str, np.ndarray],
     ) -> None:
-        """Columns of the lag of an angle that turns by so much in an interval, (sample,), to blocks of a recording."""
+        """Columns of the lag of an angle, which turns and is turned faster by so much in an interval (2, sample), to
+        blocks of a recording."""
         name = blocks[0].recording
         if name not in self._late:
             if self.large:
                 self._late.clear()
-            self._late[name] = {e: -x[0] for e, x in self.seen_in("angle", name, turned[None]).items()}
+            self._late[name] = {e: -x for e, x in self.seen_in("angle", name, turned).items()}
         for block in blocks:
-            column = self._late[name].get(block.equation)
-            if column is None:
-                column = -self.seen_at(values, name, turned[None], less)[0]
-            block.columns |= {n: LATE_ANGLE[n] * column for n in names}
+            shown = self._late[name].get(block.equation)
+            if shown is None:
+                shown = -self.seen_at(values, name, turned, less)
+            block.columns |= {n: _by_lag(n, values.get(n, 0.0)) @ shown for n in names}
 
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
         """Channels in which a form of a driver of an equation may lie, rather than in the equation itself."""
@@ -292,6 +293,24 @@ class ReferenceActuator:
                 self._functions.clear()
             self._functions[rec.name] = functions_of(rec.rows_from)
         return self._functions[rec.name]
+
+
+def _turned(angle: np.ndarray) -> np.ndarray:
+    """(2, sample) by how much an angle changes in an interval, and by how much that changes (rad)."""
+    second = np.zeros_like(angle)
+    second[1:-1] = np.diff(angle, 2)
+    return np.array([np.gradient(angle), second])
+
+
+def _ahead(name: str, lag: float) -> np.ndarray:
+    """(2,) what of these is to be added to an angle y that is recorded as (1 - l) y[n] + l y[n - 1], or with n + 1, to
+    the second order."""
+    return np.array([LATE_ANGLE[name] * lag, lag * lag - 0.5 * lag])
+
+
+def _by_lag(name: str, lag: float) -> np.ndarray:
+    """(2,) the same, differentiated."""
+    return np.array([LATE_ANGLE[name], 2.0 * lag - 0.5])
 
 
 def _known(state: State, equation: str) -> np.ndarray | bool:

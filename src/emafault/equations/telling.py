@@ -9,22 +9,12 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
-from .acquisition import full_range
 from .coordinates import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
 APART = 3.0  # standard deviations from nominal at which a controller's gain is told as different
 TELLING = 0.02  # of a gain: smaller differences are not worth telling
-LATE = {
-    "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
-    "filtered": "is behind a first-order filter with a time constant of {}",
-}  # fmt: skip
-CHANNELS = {"output": "output position", "bus_voltage": "bus voltage"}  # words of those that have others
-CONTROLLER = {
-    "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
-    "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
-}
 WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
 
@@ -116,78 +106,6 @@ def differing_gains(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         if apart > APART * sd and apart > TELLING * g["nominal"]:
             out[name] = g
     return out
-
-
-def told_of_chain(
-    unit: str,
-    equation: str,
-    linear: Mapping[str, tuple[float, float]],
-    units: Mapping[str, str],
-    actuator: ActuatorParameters,
-) -> dict[str, Any]:
-    """The same of a fault of the measuring chain that has parameters of its own (lag, crosstalk, drift, curve, drop),
-    and of what a controller does beside its gains."""
-    kind, _, channel = unit.removeprefix("~").partition("_")
-    name = channel.replace("_", " of phase ")
-    said = {n: {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]} for n, (v, sd) in linear.items()}
-    if kind == "curve":
-        full = f"{full_range(actuator, channel):g} {'V' if channel == 'voltage' else 'A'}"
-        ((at, bend),) = said.items()
-        phase = at.partition("_")[2]
-        which = f"{channel} of phase {phase}" if phase else f"{channel}s"
-        (share, _) = linear[at]
-        verb = "has" if phase else "have"
-        bends = f"the recorded {which} {verb} a cubic nonlinearity, {100.0 * share:.2g} % too low at {full}"
-        return {
-            "equation": equation, "along": "current" if channel == "current" else "time", "form": "sensor_curve",
-            "parameters": {"bend": bend}, "sentence": f"In the measuring chain: {bends}.",
-        }  # fmt: skip
-    if kind == "drop":
-        ((at, drop),) = ((n, v) for n, v in said.items() if n != "drop.turn")
-        phase = at.partition("_")[2]
-        which = f"voltage of phase {phase} is" if phase else "voltages are"
-        (amount, _) = linear[at]
-        high = f"{abs(amount):.2g} V too {'high' if amount > 0.0 else 'low'}"
-        why = "as one is that is computed of duty cycles without the drop of the switches and their dead time"
-        return {
-            "equation": equation, "along": "current", "form": "sensor_curve",
-            "parameters": {"drop": drop, "turn": said["drop.turn"]},
-            "sentence": f"In the measuring chain: the recorded {which} {high} in the current's direction, {why}.",
-        }  # fmt: skip
-    if kind == "controller":
-        ((amount, _),) = linear.values()
-        return {
-            "equation": equation, "along": "time", "form": kind, "parameters": said,
-            "sentence": f"In the control equation: {CONTROLLER[channel].format(amount)}.",
-        }  # fmt: skip
-    if unit == "~ambient":
-        above = [v for v, _ in linear.values()]
-        ends = f"{min(above):.2g} to {max(above):.2g} K above the recorded ambient temperature"
-        return {
-            "equation": equation, "along": "temperature", "form": "drift", "parameters": said,
-            "sentence": f"In the measuring chain: at the start of the recordings the machine is {ends}.",
-        }  # fmt: skip
-    says = f"{kind} of the {CHANNELS.get(channel, name)} channel"
-    if kind == "drift" and all("@" not in n for n in linear):
-        ((offset, _),), (unit_of,) = linear.values(), {units[n] for n in linear}
-        says = f"the {CHANNELS.get(channel, name)} channel has an offset of {offset:.2g} {unit_of}"
-    elif kind == "drift" and (starts := [v for n, (v, _) in linear.items() if n.startswith("offset")]):
-        ends = f"{min(starts):z.2g} to {max(starts):z.2g} {next(iter(units.values()))}"
-        also = ", and drifts along it" * (len(starts) < len(linear))
-        says = f"the offset of the {CHANNELS.get(channel, name)} channel is another one in each recording, {ends}{also}"
-    if kind == "gain":
-        gains, phase = [v for v, _ in linear.values()], next(iter(linear)).partition(".")[2].partition("@")[0]
-        whose = f"{channel}s" if phase == "all" else f"{channel} of phase {phase}"
-        ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %"
-        says, kind = f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift"
-    if kind == "lag":
-        ((at, (amount, _)),) = linear.items()
-        says = f"the {CHANNELS.get(channel, name)} channel {LATE[at.rpartition('_')[2]]}"
-        says = says.format(f"{amount:.2g} intervals")
-    return {
-        "equation": equation, "along": "time", "form": kind, "parameters": said,
-        "sentence": f"In the measuring chain: {says}.",
-    }  # fmt: skip
 
 
 def place(form: Described) -> str:

@@ -25,6 +25,7 @@ from .parameters import GAINS
 from .point import SEEDED
 from .quality import at_a_glance, told
 from .telling import EQUATION, Z
+from .telling_chain import told_of_chain
 from .terms import TERMS
 
 SCHEMA = "2.0"
@@ -191,7 +192,7 @@ def _discovered(fitted: Fitted) -> list[dict]:
             entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
         else:
             units = {p.name: p.units for p in unit.parameters}
-            entry = telling.told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+            entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
             entry["term"] = carried.of_chain(form, linear)
         out.append(
             {

@@ -2,7 +2,8 @@
 
 from ..diagnosis.described import Described
 from .point import SEEDED
-from .telling import CHANNELS, LATE, bare
+from .telling import bare
+from .telling_chain import CHANNELS, LATE
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",

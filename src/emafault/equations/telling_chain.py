@@ -1,0 +1,154 @@
+"""Faults of the measuring chain that have parameters of their own, and what a controller does with its command, in
+words: one function a kind."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..actuator.parameters import ActuatorParameters
+from .acquisition import full_range
+from .telling import Z
+
+LATE = {
+    "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
+    "filtered": "is behind a first-order filter with a time constant of {}",
+}  # fmt: skip
+CHANNELS = {"output": "output position", "bus_voltage": "bus voltage"}  # words of those that have others
+CONTROLLER = {
+    "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
+    "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
+}
+CHAIN = "In the measuring chain"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault as fitted: its channel, and by name of a parameter its value, standard deviation and unit."""
+
+    channel: str
+    linear: Mapping[str, tuple[float, float]]
+    units: Mapping[str, str]
+    actuator: ActuatorParameters
+
+    @property
+    def values(self) -> dict[str, float]:
+        """By name."""
+        return {n: v for n, (v, _) in self.linear.items()}
+
+    @property
+    def whose(self) -> str:
+        """The channel in words."""
+        quantity, _, phase = (self.channel, "", "") if self.channel in CHANNELS else self.channel.partition("_")
+        return f"{CHANNELS.get(quantity, quantity)} channel" + (f" of phase {phase}" if phase else "")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a verdict tells of a fault: a clause, what it goes along, its form, where it lies, and other names of its
+    parameters."""
+
+    says: str
+    form: str
+    along: str = "time"
+    where: str = CHAIN
+    names: Mapping[str, str] = field(default_factory=dict)
+
+
+def told_of_chain(
+    unit: str,
+    equation: str,
+    linear: Mapping[str, tuple[float, float]],
+    units: Mapping[str, str],
+    actuator: ActuatorParameters,
+) -> dict[str, Any]:
+    """A unit of the measuring chain or of the controller as ``discovered`` tells it.
+
+    Parameters
+    ----------
+    equation : of the verdict
+    linear : coefficients and their standard deviations by name
+    """
+    kind, _, channel = unit.removeprefix("~").partition("_")
+    told = KINDS[kind](Fault(channel, linear, units, actuator))
+    said = {
+        told.names.get(n, n): {"value": v, "low": v - Z * sd, "high": v + Z * sd, "units": units[n]}
+        for n, (v, sd) in linear.items()
+    }
+    return {
+        "equation": equation, "along": told.along, "form": told.form, "parameters": said,
+        "sentence": f"{told.where}: {told.says}.",
+    }  # fmt: skip
+
+
+def _of_phase(quantity: str, phase: str) -> str:
+    return f"{quantity} of phase {phase}" if phase else f"{quantity}s"
+
+
+def _curve(fault: Fault) -> Told:
+    ((at, share),) = fault.values.items()
+    phase = at.partition("_")[2]
+    full = f"{full_range(fault.actuator, fault.channel):g} {'V' if fault.channel == 'voltage' else 'A'}"
+    which = f"the recorded {_of_phase(fault.channel, phase)} {'has' if phase else 'have'}"
+    says = f"{which} a cubic nonlinearity, {100.0 * share:.2g} % too low at {full}"
+    return Told(says, "sensor_curve", "current" if fault.channel == "current" else "time", names={at: "bend"})
+
+
+def _drop(fault: Fault) -> Told:
+    ((at, amount),) = ((n, v) for n, v in fault.values.items() if n != "drop.turn")
+    phase = at.partition("_")[2]
+    high = f"{abs(amount):.2g} V too {'high' if amount > 0.0 else 'low'}"
+    why = "as one is that is computed of duty cycles without the drop of the switches and their dead time"
+    which = f"the recorded {_of_phase('voltage', phase)} {'is' if phase else 'are'}"
+    says = f"{which} {high} in the current's direction, {why}"
+    return Told(says, "sensor_curve", "current", names={at: "drop", "drop.turn": "turn"})
+
+
+def _controller(fault: Fault) -> Told:
+    (amount,) = fault.values.values()
+    return Told(CONTROLLER[fault.channel].format(amount), "controller", where="In the control equation")
+
+
+def _ambient(fault: Fault) -> Told:
+    above = fault.values.values()
+    ends = f"{min(above):.2g} to {max(above):.2g} K above the recorded ambient temperature"
+    return Told(f"at the start of the recordings the machine is {ends}", "drift", "temperature")
+
+
+def _crosstalk(fault: Fault) -> Told:
+    ((name, gain),) = fault.values.items()
+    phases, what = name.rpartition(".")[2], fault.channel
+    takes_up = f"takes up {100.0 * gain:.2g} % of the {what} of phase {phases[1]}"
+    return Told(f"the {what} channel of phase {phases[0]} {takes_up}", "crosstalk")
+
+
+def _drift(fault: Fault) -> Told:
+    unit = next(iter(fault.units.values()))
+    if all("@" not in n for n in fault.linear):
+        (offset,) = fault.values.values()
+        return Told(f"the {fault.whose} has an offset of {offset:.2g} {unit}", "drift")
+    starts = [v for n, v in fault.values.items() if n.startswith("offset")]
+    if not starts:
+        return Told(f"the {fault.whose} drifts", "drift")
+    ends = f"{min(starts):z.2g} to {max(starts):z.2g} {unit}"
+    also = ", and drifts along it" * (len(starts) < len(fault.linear))
+    return Told(f"the offset of the {fault.whose} is another one in each recording, {ends}{also}", "drift")
+
+
+def _gain(fault: Fault) -> Told:
+    phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
+    whose = _of_phase(fault.channel, "" if phase == "all" else phase)
+    gains = fault.values.values()
+    ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %"
+    return Told(f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift")
+
+
+def _lag(fault: Fault) -> Told:
+    ((at, amount),) = fault.values.items()
+    late = LATE[at.rpartition("_")[2]].format(f"{amount:.2g} intervals")
+    return Told(f"the {fault.whose} {late}", "lag")
+
+
+KINDS: dict[str, Callable[[Fault], Told]] = {
+    "lag": _lag, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift, "gain": _gain,
+    "ambient": _ambient, "controller": _controller,
+}  # fmt: skip
