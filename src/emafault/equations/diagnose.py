@@ -116,7 +116,7 @@ def diagnose(
     # from here on the confirm recordings are open
     known = machine.recordings
     signals = {n: known[n] if n in known else Signals.of(n, r, actuator, own) for n, r in recordings.items()}
-    whole = ReferenceActuator(actuator, signals, *library)
+    whole = ReferenceActuator(actuator, signals, *library, machine.reference)
     every = Bench(whole, list(recordings), processes)
     all_fit = every.fit((bench, fit))
     units, observed = all_fit.search.units.values(), tuple(whole.observed())

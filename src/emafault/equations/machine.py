@@ -48,8 +48,11 @@ class ReferenceActuator:
         recordings: Mapping[str, Signals],
         exclude: Sequence[str] = (),
         catalogue: Mapping[str, Effect] | None = None,
+        reference: str | None = None,
     ):
         self.actuator = actuator
+        # gains of recordings are told against that of one: what they all have is the unit's own
+        self.reference = reference or max(recordings, key=lambda n: float(np.abs(np.diff(recordings[n].angle)).sum()))
         self.catalogue = dict(catalogue or scaled(actuator))
         self.recordings = dict(recordings)
         self._disturbed: dict[str, Signals] = {}
@@ -63,7 +66,7 @@ class ReferenceActuator:
         self.units = [
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
-        self.units += [*measuring_chain(actuator, self.recordings), *controller(actuator)]
+        self.units += [*measuring_chain(actuator, self.recordings, self.reference), *controller(actuator)]
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)
@@ -133,7 +136,7 @@ class ReferenceActuator:
         late = [n for n in LATE_ANGLE if wanted is None or n in wanted]
         less = dict(less or {})
         lags = {n: values.get(n, 0.0) for n in LATE_ANGLE}
-        turned = _turned(self.recordings[name].angle) if late or any(lags.values()) else None
+        turned = _turned(self.recordings[name]) if late or any(lags.values()) else None
         if turned is not None and any(lags.values()):
             less["angle"] = less.get("angle", 0.0) - sum(_ahead(n, x) @ turned for n, x in lags.items())
         blocks = self._recording(values, _less(rec, less), wanted)
@@ -295,11 +298,10 @@ class ReferenceActuator:
         return self._functions[rec.name]
 
 
-def _turned(angle: np.ndarray) -> np.ndarray:
-    """(2, sample) by how much an angle changes in an interval, and by how much that changes (rad)."""
-    second = np.zeros_like(angle)
-    second[1:-1] = np.diff(angle, 2)
-    return np.array([np.gradient(angle), second])
+def _turned(rec: Signals) -> np.ndarray:
+    """(2, sample) by how much the angle changes in an interval, and by how much that changes (rad), the latter of a
+    smoothed angle: the noise of a second difference is that of the torque's equation."""
+    return np.array([np.gradient(rec.angle), rec.acceleration * rec.interval**2])
 
 
 def _ahead(name: str, lag: float) -> np.ndarray:

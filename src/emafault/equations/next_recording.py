@@ -122,7 +122,7 @@ def _next_normal(bench: Bench, recording: Recording, noise: SensorNoise) -> tupl
     what belongs to it alone."""
     actuator = bench.machine.actuator
     signals, of = {NEXT: Signals.of(NEXT, recording, actuator, noise)}, bench.machine
-    machine = ReferenceActuator(actuator, signals, of.left_out, of.catalogue)
+    machine = ReferenceActuator(actuator, signals, of.left_out, of.catalogue, of.reference)
     new = Bench(machine, [NEXT])
     new.point |= {n: v for n, v in bench.point.items() if n in new.point}
     new.on = set(bench.on)

@@ -138,8 +138,11 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
     return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
 
 
-def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) -> list[Unit]:
-    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift, gain."""
+def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
+    """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift, gain.
+
+    ``reference``: the recording that the others' gains are told against.
+    """
     out = []
     # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
     only = {"speed": ("early",), "angle": ("late", "early")}
@@ -168,19 +171,20 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals]) ->
         also = [turn] if kind == "drop" else []
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
         out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
-    return out + _drifts(recordings)
+    return out + _drifts(recordings, reference)
 
 
 def _shows(channel: str) -> tuple[str, ...]:
     return (f"sensor_{channel}", *IN.get(channel, ()))
 
 
-def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
+def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
     """Channels whose offset grows along a recording or is another one in each, or whose gain is.
 
     A current's offset that is always the same is in the catalogue.
     """
     out = []
+    others = [n for n in recordings if n != reference]
     noise = next(iter(recordings.values())).noise
     for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s"), ("output", "rad")):
         sd = FAR_OUT * float(getattr(noise, {"output": "position"}.get(quantity, quantity)))
@@ -197,9 +201,9 @@ def _drifts(recordings: Mapping[str, Signals]) -> list[Unit]:
             # evenly over the quantities, then over a quantity's phases and its gain
             among = 4.0 * (len(phases) + 1 if len(phases) > 1 else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
-        if len(phases) > 1:
+        if len(phases) > 1 and others:
             gains = [
-                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in recordings])
+                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in others])
                 for j in ("all", *phases)
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))

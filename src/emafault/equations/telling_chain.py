@@ -110,7 +110,7 @@ def _controller(fault: Fault) -> Told:
 
 def _ambient(fault: Fault) -> Told:
     above = fault.values.values()
-    ends = f"{min(above):.2g} to {max(above):.2g} K above the recorded ambient temperature"
+    ends = f"{min(above):z.2g} to {max(above):z.2g} K above the recorded ambient temperature"
     return Told(f"at the start of the recordings the machine is {ends}", "drift", "temperature")
 
 
@@ -137,8 +137,8 @@ def _drift(fault: Fault) -> Told:
 def _gain(fault: Fault) -> Told:
     phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
     whose = _of_phase(fault.channel, "" if phase == "all" else phase)
-    gains = fault.values.values()
-    ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %"
+    gains = [0.0, *fault.values.values()]
+    ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} % of one of them"
     return Told(f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift")
 
 
