@@ -261,7 +261,7 @@ def test_what_a_channel_has_of_its_own_in_each_recording_is_told_and_undone(case
     assert found.verdict["which"][0]["effects"] == ["cogging"]
     (told,) = found.verdict["discovered"]
     assert (told["form"], told["equation"]) == ("drift", equation)
-    assert "another one in each recording" in told["sentence"]
+    assert "differs between recordings" in told["sentence"]
     assert write_corrected(found, changed, tmp_path / "bench", tmp_path / "new")
     undone = {name: read_recording(tmp_path / "new" / name) for name in true}
     for variable in sizes:

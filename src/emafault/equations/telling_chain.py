@@ -129,17 +129,17 @@ def _drift(fault: Fault) -> Told:
     starts = [v for n, v in fault.values.items() if n.startswith("offset")]
     if not starts:
         return Told(f"the {fault.whose} drifts", "drift")
-    ends = f"{min(starts):z.2g} to {max(starts):z.2g} {unit}"
-    also = ", and drifts along it" * (len(starts) < len(fault.linear))
-    return Told(f"the offset of the {fault.whose} is another one in each recording, {ends}{also}", "drift")
+    ends = f"from {min(starts):z.2g} to {max(starts):z.2g} {unit}"
+    also = ", and drifts within them" * (len(starts) < len(fault.linear))
+    return Told(f"the offset of the {fault.whose} differs between recordings, {ends}{also}", "drift")
 
 
 def _gain(fault: Fault) -> Told:
     phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
     whose = _of_phase(fault.channel, "" if phase == "all" else phase)
     gains = [0.0, *fault.values.values()]
-    ends = f"{100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} % of one of them"
-    return Told(f"the gain of the recorded {whose} is another one in each recording, {ends}", "drift")
+    ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} % from that in one of them"
+    return Told(f"the gain of the recorded {whose} differs between recordings, {ends}", "drift")
 
 
 def _lag(fault: Fault) -> Told:
