@@ -223,7 +223,7 @@ def test_an_angle_that_lags_is_told_and_undone(lag, tmp_path):
         assert np.std(got.rotor_angle - r.rotor_angle) < 0.1 * np.std(late[name].rotor_angle - r.rotor_angle)
 
 
-@pytest.mark.parametrize("lag", [0.3, 0.7, 1.0])
+@pytest.mark.parametrize("lag", [0.7, 1.0])
 def test_currents_that_lag_are_told(lag):
     def lagging(x):
         return x + lag * (np.vstack([x[:1], x[:-1]]) - x)
@@ -241,7 +241,6 @@ def test_currents_that_lag_are_told(lag):
 BY_RECORDING = {
     "offset of a current": ({"phase_current": (0.006, 0.0), "phase_current_end": (0.006, 0.0)}, 1, "sensor_current"),
     "gain of the currents": ({"phase_current": (0.0, 0.01), "phase_current_end": (0.0, 0.01)}, None, "sensor_current"),
-    "gain of a voltage": ({"phase_voltage": (0.0, 0.01)}, 2, "sensor_voltage"),
 }
 
 
@@ -276,7 +275,6 @@ def test_what_a_channel_has_of_its_own_in_each_recording_is_told_and_undone(case
     ("variable", "of", "form", "equation"),
     [
         ("phase_voltage", lambda v: v + 0.01 * v[:, [2, 1, 0]] * [1.0, 0.0, 0.0], "crosstalk", "sensor_voltage"),
-        ("phase_voltage", lambda v: v + np.array([0.0, 0.3, 0.0]), "drift", "sensor_voltage"),
         ("rotor_speed", lambda w: w + 1.5, "drift", "sensor_speed"),
     ],
 )
