@@ -150,7 +150,7 @@ def _spread(block: Block, used: np.ndarray) -> float:
     Of a noisy signal that the point only filters it says nothing: the likelihood with the true signal at its best has
     none (functional errors in variables: Fuller 1987, Measurement Error Models, section 1.1.2).
     """
-    return 0.0 if block.sure else 2.0 * float(np.sum(np.log(block.factor[0][used & block.usable])))
+    return 0.0 if block.filters else 2.0 * float(np.sum(np.log(block.factor[0][used & block.usable])))
 
 
 def _weighed(rows: np.ndarray, weights: Weights | None) -> np.ndarray:

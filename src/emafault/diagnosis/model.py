@@ -79,8 +79,8 @@ class Block:
     ``residual`` (row,), ``columns`` parameter -> scalar or (row,), ``bands`` diagonals of the noise's covariance
     (main first), ``usable`` (row,) bool, ``coordinates`` name -> (row,), with ``phi`` (function, row) and ``drivers``
     (driver, row) for remainders. ``rounded``: a converter's steps are a part of the noise, so that most rows may leave
-    nothing, and what slow signals leave wanders. ``sure``: what the point changes of the covariance is what it makes of
-    the noise of recorded signals, which is known, not how large an error may be.
+    nothing, and what slow signals leave wanders. ``filters``: the point changes the covariance only
+    in that it filters the noise of recorded signals, which is known, not in how large an error may be.
     """
 
     recording: str
@@ -91,7 +91,7 @@ class Block:
     usable: np.ndarray
     coordinates: dict = field(default_factory=dict)
     rounded: bool = False
-    sure: bool = False
+    filters: bool = False
 
     @cached_property
     def factor(self) -> np.ndarray:

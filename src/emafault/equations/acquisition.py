@@ -182,7 +182,7 @@ def _rounding(rec: Signals, p: Point) -> Dual | None:
 def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
     """(sample,) what a channel has too much: an offset, of all or of the recording's own, and what grows along it."""
     out: Dual | float = 0.0
-    always, offset, drift = (p(f"{n}_{quantity}.{phase}{at}") for n, at in _drifting(rec.name))
+    always, offset, drift = (p(f"{n}_{quantity}.{phase}{at}") for n, at in drifting(rec.name))
     if drift.slopes or drift.value:
         out = drift * (rec.time / rec.time[-1])
     for level in (always, offset):
@@ -191,7 +191,8 @@ def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
     return out
 
 
-def _drifting(recording: str) -> tuple[tuple[str, str], ...]:
+def drifting(recording: str) -> tuple[tuple[str, str], ...]:
+    """Before and after the names of an offset of all recordings, of one recording's own, and of what grows along it."""
     return ("offset", ""), ("offset", f"@{recording}"), ("drift", f"@{recording}")
 
 

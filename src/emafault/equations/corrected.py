@@ -12,7 +12,7 @@ from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import calm_motion, without_spikes
 from ..switches import direction
-from .acquisition import full_range, rates, undone
+from .acquisition import drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
 
@@ -125,10 +125,7 @@ def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recordin
 
 def _drifted(values: Mapping[str, float], quantity: str, phase: str, recording: str, share: np.ndarray) -> np.ndarray:
     """(sample,) what a channel has too much, at a ``share`` of the recording."""
-    always, start, grows = (
-        values.get(f"{kind}_{quantity}.{phase}{at}", 0.0)
-        for kind, at in (("offset", ""), ("offset", f"@{recording}"), ("drift", f"@{recording}"))
-    )
+    always, start, grows = (values.get(f"{kind}_{quantity}.{phase}{at}", 0.0) for kind, at in drifting(recording))
     return always + start + grows * share
 
 

@@ -12,7 +12,7 @@ from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
-from .parameters import STANDS_OUT, controller, internal, measuring_chain, nuisances, unit_of
+from .parameters import controller, internal, measuring_chain, nuisances, unit_of
 from .point import Point, State
 from .signals import Signals
 
@@ -30,6 +30,7 @@ OF_STATE = {
 }  # fmt: skip
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
 BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and of the torque's, that of the motor
+STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 LATE_ANGLE = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of an angle that lags, with their sides
@@ -254,8 +255,8 @@ class ReferenceActuator:
         columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
         along = self._coordinates(state, name)
         rounded = (state.rec.output_step if name == "position" else state.rec.current_step) > 0.0
-        sure = name == "sensor_speed"
-        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded, sure)
+        filters = name == "sensor_speed"
+        return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded, filters)
 
     def _secants(self, state: State, equation: str, r, values: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Columns of effects that have no derivative at "off": the residual with them less that without."""

@@ -25,7 +25,6 @@ LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling 
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
-STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 FAR_OUT = 100.0  # of a channel's noise, for the scale of its offset
 WARM = 30.0  # K, by which a machine may not have the recorded ambient temperature
 GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next

@@ -80,7 +80,8 @@ def told_of_chain(
     }  # fmt: skip
 
 
-def _of_phase(quantity: str, phase: str) -> str:
+def of_phase(quantity: str, phase: str) -> str:
+    """A channel of one phase, or of all."""
     return f"{quantity} of phase {phase}" if phase else f"{quantity}s"
 
 
@@ -88,7 +89,7 @@ def _curve(fault: Fault) -> Told:
     ((at, share),) = fault.values.items()
     phase = at.partition("_")[2]
     full = f"{full_range(fault.actuator, fault.channel):g} {'V' if fault.channel == 'voltage' else 'A'}"
-    which = f"the recorded {_of_phase(fault.channel, phase)} {'has' if phase else 'have'}"
+    which = f"the recorded {of_phase(fault.channel, phase)} {'has' if phase else 'have'}"
     says = f"{which} a cubic nonlinearity, {100.0 * share:.2g} % too low at {full}"
     return Told(says, "sensor_curve", "current" if fault.channel == "current" else "time", names={at: "bend"})
 
@@ -98,7 +99,7 @@ def _drop(fault: Fault) -> Told:
     phase = at.partition("_")[2]
     high = f"{abs(amount):.2g} V too {'high' if amount > 0.0 else 'low'}"
     why = "as one is that is computed of duty cycles without the drop of the switches and their dead time"
-    which = f"the recorded {_of_phase('voltage', phase)} {'is' if phase else 'are'}"
+    which = f"the recorded {of_phase('voltage', phase)} {'is' if phase else 'are'}"
     says = f"{which} {high} in the current's direction, {why}"
     return Told(says, "sensor_curve", "current", names={at: "drop", "drop.turn": "turn"})
 
@@ -136,7 +137,7 @@ def _drift(fault: Fault) -> Told:
 
 def _gain(fault: Fault) -> Told:
     phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
-    whose = _of_phase(fault.channel, "" if phase == "all" else phase)
+    whose = of_phase(fault.channel, "" if phase == "all" else phase)
     gains = [0.0, *fault.values.values()]
     ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} % from that in one of them"
     return Told(f"the gain of the recorded {whose} differs between recordings, {ends}", "drift")

@@ -271,7 +271,7 @@ def _faults(fitted: Fitted, recordings: Mapping[str, Recording]) -> dict[str, di
             parts = [component if component != "dT" and rec.health == "unknown" else f"{component}@{name}"]
             if component != "dT" and rec.health == "seeded":
                 parts.append(SEEDED + component)
-            if component == "dT" and f"ambient.start@{name}" in bench.parameters:
+            if component == "dT":
                 parts.append(f"ambient.start@{name}")
             k = [index[n] for n in parts if n in index]
             sd = float(np.sqrt(covariance[np.ix_(k, k)].sum()))

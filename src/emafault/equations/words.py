@@ -3,7 +3,7 @@
 from ..diagnosis.described import Described
 from .point import SEEDED
 from .telling import bare
-from .telling_chain import CHANNELS, LATE
+from .telling_chain import CHANNELS, LATE, of_phase
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
@@ -123,14 +123,10 @@ def _of_group(group: str, short: str) -> str:
             for kind in ("drift", "offset")
             for q in ("current", "voltage", "speed", "output")
         },
-        "gain_current": f"gain of the {_of(short, 'current')}, less one",
-        "gain_voltage": f"gain of the {_of(short, 'voltage')}, less one",
+        "gain_current": f"gain of the {of_phase('current', short.removeprefix('all'))}, less one",
+        "gain_voltage": f"gain of the {of_phase('voltage', short.removeprefix('all'))}, less one",
     }
     return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
-
-
-def _of(phase: str, quantity: str) -> str:
-    return f"{quantity}s" if phase == "all" else f"{quantity} of phase {phase}"
 
 
 def _late(way: str) -> str:
