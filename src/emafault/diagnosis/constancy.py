@@ -17,14 +17,14 @@ from .evidence import Reduced, log_evidence
 from .fit import Bench, Fit
 from .linear import White, assemble
 from .model import WORDS
-from .search import FORM_PRIOR, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
+from .search import ONE_MORE_FORM, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
 
 SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
 #: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes
 SIZES = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 SHARES = (10.0, 3.0, 1.0, 0.3)  # of a unit's size, of what goes along its columns without being of its form
 #: log odds before the data that what is seen is no listed effect, but a coefficient that changes
-PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)) - np.log(SIZE_PRIOR[1] / SIZE_PRIOR[0]))
+PRIOR = float(np.log(ONE_MORE_FORM / len(WORDS)) - np.log(SIZE_PRIOR[1] / SIZE_PRIOR[0]))
 
 
 def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float:

@@ -10,14 +10,14 @@ from .forms import FORMS
 from .left import Left, beside_first, gain
 from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
-from .search import FORM_PRIOR, OTHER_FORM, Search
+from .search import ONE_MORE_FORM, OTHER_FORM, Search
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too
 BINS = (30, 15, 8)  # of a picture: the most that show more than their errors
 FINER = 2.0  # times what a coarse look finds, that a fine one may
 STEPS = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # standard deviations of a scan, about the shape that it has found
-PRIOR = float(np.log(FORM_PRIOR[1] / FORM_PRIOR[0] / len(WORDS)))  # log odds of a form of one kind
+PRIOR = float(np.log(ONE_MORE_FORM / len(WORDS)))  # log odds of a form of one kind
 ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
 SPAN = 10.0  # widest prior of a coefficient over the noise of a row

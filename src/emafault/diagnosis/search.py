@@ -5,14 +5,14 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import gammaln, ndtr
 
 from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
 from .model import WORDS, Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
-FORM_PRIOR = (0.70, 0.22, 0.08)  # of no, one, two described forms
+ONE_MORE_FORM = 0.3  # of a bench with any number of described forms, to have one more
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range no catalogue gives
@@ -216,17 +216,20 @@ class Search:
         return value, free, found, deviation
 
     def log_prior(self, members: Sequence[tuple[str, int]]) -> float:
-        """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size."""
+        """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size.
+
+        Described forms come one after the other, each of any kind: a set has the orders that they may come in.
+        """
         kinds = [self.units[u].kind for u, _ in members]
         listed = sum(k in ("structural", "calibration") for k in kinds)
         controls = sum(u in self.of_controller for u, _ in members)
         forms, left = kinds.count("form") - controls, kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
         own = [u for u, v in members if v >= OTHER_FORM]
-        if listed >= len(self.size_prior) or forms >= len(FORM_PRIOR):
+        if listed >= len(self.size_prior):
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
-        value += np.log(FORM_PRIOR[forms]) - _log_choose(n_forms, forms)
+        value += np.log(1.0 - ONE_MORE_FORM) + forms * np.log(ONE_MORE_FORM / n_forms) + gammaln(forms + 1)
         value -= sum(np.log(self.units[u].among) for u, _ in members)
         value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
         value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)

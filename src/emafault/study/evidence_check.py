@@ -9,8 +9,7 @@ import json
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
-from math import comb, prod
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from ..diagnosis.evidence import Normal, Reduced, marginalise
 from ..diagnosis.fit import CARRYING, Bench
 from ..diagnosis.model import LISTED, WORDS, Unit
 from ..diagnosis.search import (
-    FORM_PRIOR,
+    ONE_MORE_FORM,
     OTHER_FORM,
     OTHER_FORM_PRIOR,
     REMAINDER_PRIOR,
@@ -197,9 +196,12 @@ def draw_truth(bench: LinearBench, rng: np.random.Generator, width: float = 1.0)
 
 def _drawn_forms(forms: Sequence[Unit], rng: np.random.Generator) -> tuple[str, ...]:
     """Ids of forms drawn from those of the prior's sets that are among these."""
-    sets = [s for k in range(len(FORM_PRIOR)) for s in combinations(forms, k)]
-    weights = [FORM_PRIOR[len(s)] / comb(len(WORDS), len(s)) / prod(u.among for u in s) for s in sets]
-    return tuple(u.id for u in sets[rng.choice(len(sets), p=np.array(weights) / sum(weights))])
+    share = np.array([1.0 / (len(WORDS) * u.among) for u in forms])
+    while True:
+        count = rng.geometric(1.0 - ONE_MORE_FORM * share.sum()) - 1
+        drawn = set(rng.choice(len(forms), count, p=share / share.sum()).tolist())
+        if len(drawn) == count:  # sets hold a form once
+            return tuple(forms[k].id for k in sorted(drawn))
 
 
 def _allowed(bench: LinearBench, c: Candidate, d: np.ndarray) -> np.ndarray:
