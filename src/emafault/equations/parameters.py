@@ -140,7 +140,7 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
 def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
     """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift, gain.
 
-    ``reference``: the recording that the others' gains are told against.
+    ``reference``: the recording that gains of all phases alike are told against in the others.
     """
     out = []
     # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
@@ -201,9 +201,10 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
             among = 4.0 * (len(phases) + 1 if len(phases) > 1 else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
         if len(phases) > 1 and others:
+            # what all phases' gains have in common in all recordings is the unit's own calibration
             gains = [
-                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in others])
-                for j in ("all", *phases)
+                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in of])
+                for j, of in (("all", others), *((j, recordings) for j in phases))
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
     # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere

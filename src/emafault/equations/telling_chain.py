@@ -137,9 +137,10 @@ def _drift(fault: Fault) -> Told:
 
 def _gain(fault: Fault) -> Told:
     phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
-    whose = of_phase(fault.channel, "" if phase == "all" else phase)
-    gains = [0.0, *fault.values.values()]
-    ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} % from that in one of them"
+    common = phase == "all"
+    gains = [*([0.0] if common else []), *fault.values.values()]
+    ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %{' from that in one of them' * common}"
+    whose = of_phase(fault.channel, "" if common else phase)
     return Told(f"the gain of the recorded {whose} differs between recordings, {ends}", "drift")
 
 
