@@ -60,7 +60,7 @@ class Described:
         """A candidate cause."""
         each = [n for r in (recordings if FORMS[self.word].EACH else recordings[:1]) for n in self.names(r)]
         parameters = [Parameter(n, 0.0, 0.0, SPAN * self.scale) for n in each]
-        return Unit(self.id, "form", (self.equation,), [Variant(parameters)], among=self.among)
+        return Unit(self.id, "form", (self.equation,), [Variant(parameters)], among=self.among, proposed=True)
 
     def columns(self, block: Block) -> np.ndarray:
         """(column, row) of a block: the derivatives of its residual."""

@@ -59,6 +59,7 @@ class Unit:
     on: Variant | None = None  # once its own parameters are at a point where it acts
     among: float = 1.0  # alternatives of a form that the prior of its kind is spread over
     alike: bool = False  # whether its variants look alike near off, and are told apart at their own optima alone
+    proposed: bool = False  # of a form: by a scan of what is left
 
     @property
     def of_controller(self) -> bool:

@@ -13,6 +13,7 @@ from .model import WORDS, Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 ONE_MORE_FORM = 0.3  # of a bench with any number of described forms, to have one more
+PROPOSED = 2  # forms that a scan proposed: what needs more of them is a remainder
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range no catalogue gives
@@ -226,7 +227,7 @@ class Search:
         forms, left = kinds.count("form") - controls, kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
         own = [u for u, v in members if v >= OTHER_FORM]
-        if listed >= len(self.size_prior):
+        if listed >= len(self.size_prior) or sum(self.units[u].proposed for u, _ in members) > PROPOSED:
             return -np.inf
         value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
         value += np.log(1.0 - ONE_MORE_FORM) + forms * np.log(ONE_MORE_FORM / n_forms) + gammaln(forms + 1)

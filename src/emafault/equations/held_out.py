@@ -56,10 +56,10 @@ def held_to_account(
     account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
     whole predicts worse than without its effects, each is tried by itself.
 
-    Where there is a remainder, or what is left wanders (``wandering``: by equation, log odds that it does), none of the
-    sets is the true one, and what the explored recordings give a set is no odds of its truth (the M-open view: Bernardo
-    and Smith 1994, Bayesian Theory, 6.1.2): there the predictive densities of the confirm recordings decide by
-    themselves, beside the prior.
+    Where there is a remainder, or what is left wanders (``wandering``: by equation, log odds that it does), or in an
+    effect's equation a form was seen that the confirm recordings do not confirm, none of the sets is the true one, and
+    what the explored recordings give a set is no odds of its truth (the M-open view: Bernardo and Smith 1994, Bayesian
+    Theory, 6.1.2): there the predictive densities of the confirm recordings decide by themselves, beside the prior.
 
     What has another size in each recording is held to account likewise: see ``constancy``.
 
@@ -83,6 +83,8 @@ def held_to_account(
         ratios[remainder] = account.of_remainder(remainder)
         if ratios[remainder] < CLEAR:
             sets.drop(remainder, False)
+    # what is told of effects depends on whether what is described beside them is there, or a remainder in its place
+    _ask_forms(sets, account, ratios)
     for told, incomplete in sets.told(ratios, wandering):
         effect = max(told, key=lambda u: sets.log_mass((u,)))  # of a group the likeliest stands for all
         ratio = account.ratio(effect)
@@ -99,15 +101,21 @@ def held_to_account(
         changes |= dict.fromkeys(told, change)
         other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
         sets.add_without(effect, True, sets.log_mass(told) + other)
+    _ask_forms(sets, account, ratios)  # those that are told only now
+    models = sorted(sets.models, key=lambda m: -m.log_posterior)
+    return models, HeldOut(explored, ratios, changes)
+
+
+def _ask_forms(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:
+    """Hold the described forms to account that the sets would tell."""
     for form in sets.untold(ratios, "form", NAMED):
         ratios[form] = account.ratio(form)
         sets.add_dispersed(form, (form,))
         if ratios[form] < CLEAR:
+            sets.unexplained |= set(sets.fit.search.units[form].equations)
             leading = sets.leading(form)
-            without, instead = (_less(fit.search, leading, form, left) for left in (False, True))
+            without, instead = (_less(sets.fit.search, leading, form, left) for left in (False, True))
             sets.drop(form, instead.log_posterior > without.log_posterior and account.instead(form) >= CLEAR)
-    models = sorted(sets.models, key=lambda m: -m.log_posterior)
-    return models, HeldOut(explored, ratios, changes)
 
 
 class _Sets:
@@ -115,18 +123,25 @@ class _Sets:
 
     def __init__(self, bench: Bench, fit: Fit):
         self.bench, self.fit, self.models = bench, fit, list(fit.models)
+        self.unexplained: set[str] = set()  # equations of forms that were seen but not confirmed
 
     def told(
         self, ratios: Mapping[str, float], wandering: Mapping[str, float]
     ) -> Iterator[tuple[tuple[str, ...], bool]]:
         """Listed effects that the sets, as they are by then, would name, and groups, not yet held to account; and
-        whether there is a remainder beside them that is not the controller's own business."""
+        whether the sets lack something: there is a remainder beside them that is not the controller's own business, or
+        in their equations a form was seen that is not confirmed."""
         while True:
             found = read(self.models, self.fit.search.units.values(), wandering=wandering)
             left = [t for t in (*((e,) for e in found.named), *found.groups) if not set(t) <= set(ratios)]
             if not left:
                 return
-            yield left[0], not set(found.remainders) <= set(OWN_BUSINESS)
+            incomplete = not set(found.remainders) <= set(OWN_BUSINESS)
+            yield left[0], incomplete or any(self._is_unexplained(e) for e in left[0])
+
+    def _is_unexplained(self, unit: str) -> bool:
+        equations = self.fit.search.units[unit].equations
+        return any(seen.startswith(e) for seen in self.unexplained for e in equations)
 
     def untold(self, ratios: Mapping[str, float], kind: str, least: float) -> Iterator[str]:
         """Units of a kind that the sets, as they are by then, give at least a probability, not yet held to account."""

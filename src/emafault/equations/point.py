@@ -54,7 +54,7 @@ class State:
     ``conducting`` mean of f over the part in which the phase is switched on, ``inductance`` (H), ``rise`` its voltage
     (V), ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m),
     ``shared`` the same less that of the load (N m), ``net`` less friction as well,
-    ``rotor_share`` of the inertia that turns with the rotor.
+    ``inertia`` that turns with the rotor, over the nominal one.
     """
 
     dT: Dual
@@ -73,7 +73,7 @@ class State:
     drive: np.ndarray
     shared: np.ndarray
     net: np.ndarray
-    rotor_share: float
+    inertia: float
 
     def __init__(self, rec: Signals, point: Point):
         from . import quantities

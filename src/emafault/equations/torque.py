@@ -7,7 +7,7 @@ Samples around rest are left out: dry friction has no known sign there.
 
 import numpy as np
 
-from .dual import Dual
+from .dual import Dual, value_of
 from .point import State, effect_name
 from .signals import UNRESOLVED
 from .terms import with_hook
@@ -48,10 +48,9 @@ def residual(state: State) -> Dual:
     inertia: Dual | float = 1.0
     for m in with_hook("inertia"):
         inertia = inertia * m.inertia(state.p.of(effect_name(m)))
-    state.rotor_share = float(
-        np.prod([m.rotor_share(state.p.of(effect_name(m)), rec) for m in with_hook("rotor_share")])
-    )
-    inertia = inertia * state.rotor_share
+    for m in with_hook("rotor_share"):
+        inertia = inertia * m.rotor_share(state.p.of(effect_name(m)), rec)
+    state.inertia = float(value_of(inertia))
     net = net_torque(state)
     state.net = np.asarray(net.value)
     balance = (net.linear(two_intervals, rec.size) - _beyond_means(state)) / inertia
@@ -80,12 +79,12 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((N m)2)."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
     angle = (a.inertia * s.angle / rec.interval**2) ** 2
-    current = 2.0 * (a.back_emf * s.current / state.rotor_share) ** 2
+    current = 2.0 * (a.back_emf * s.current / state.inertia) ** 2
     n = rec.size
     change = np.abs(np.diff(state.shared, append=state.shared[-1:]))
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     return [
-        6.0 * angle + 0.5 * current + (UNRESOLVED / state.rotor_share * change) ** 2,
+        6.0 * angle + 0.5 * current + (UNRESOLVED / state.inertia * change) ** 2,
         np.full(n - 1, -4.0 * angle + 0.25 * current),
         np.full(n - 2, angle),
     ]
