@@ -9,6 +9,7 @@ from emafault.diagnosis.closure import Ladder
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Unit
 from emafault.diagnosis.search import Choice, Model
+from emafault.equations import held_out
 from emafault.equations.held_out import _less
 
 from .conftest import machine_of, recorded
@@ -59,3 +60,24 @@ def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():
         "cogging", "remainder:electrical_b",
     }  # fmt: skip
     assert _less(search, model, "voltage_gain", False).units == ("cogging",)
+
+
+def test_beside_a_form_that_is_not_confirmed_no_set_of_that_equation_is_the_true_one(monkeypatch):
+    monkeypatch.setattr(held_out, "overdispersion", lambda *_: 1.0)
+    units = {
+        "~function": Unit("~function", "form", ("torque",), []),
+        "inertia": Unit("inertia", "structural", ("torque",), []),
+        "voltage_gain": Unit("voltage_gain", "structural", ("electrical",), []),
+    }
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
+
+    search = SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in units])
+    for ratio, unexplained in ((-4.1, {"inertia"}), (36.5, set())):
+        both = fit((("inertia", 0), ("~function", 0)))
+        sets = held_out._Sets(None, SimpleNamespace(models=[both], search=search))
+        account = SimpleNamespace(ratio=lambda _, ratio=ratio: ratio, instead=lambda _: 0.0)
+        held_out._ask_forms(sets, account, {})
+        assert {u for u in ("inertia", "voltage_gain") if sets._is_unexplained(u)} == unexplained
+        assert any("~function" in m.units for m in sets.models) == (ratio > 0.0)

@@ -134,6 +134,19 @@ def test_a_lag_of_the_speed_is_where_it_fits_best():
     assert min(found, key=lambda tau: found[tau]) == 1e-5
 
 
+def test_a_small_inertia_has_more_of_the_currents_noise():
+    """Else its covariance would not say so, and it would be believed for the noise that it amplifies."""
+    machine = machine_of({"a.nc": recorded("parabolic", interval=1e-3)})
+    off = {n: p.off for n, p in machine.parameters.items()}
+    for scale in (1.0, 0.4):
+        at = off | {"inertia.scale": scale}
+        block, other = (
+            next(b for b in machine.blocks(at, "a.nc", drawn, ()) if b.equation == "torque") for drawn in (False, True)
+        )
+        noise = whiten(block.bands, block.usable, (other.residual - block.residual)[:, None])[block.usable]
+        assert np.mean(noise**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(noise)))
+
+
 def test_a_current_that_flows_on_makes_torque():
     recording = recorded("step", interval=5e-5)
     machine = machine_of({"a.nc": recording})
