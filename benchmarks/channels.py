@@ -89,6 +89,27 @@ def plus_on_b(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
     return lambda x, n: x + size * each(n) * np.array([0.0, 1.0, 0.0])
 
 
+def into_a(share: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    """What phase a's channel takes up of phase b."""
+    return lambda x, n: x + share * np.outer(x[:, 1], [1.0, 0.0, 0.0])
+
+
+def late(share: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    """A signal that lags by a share of an interval."""
+    return lambda x, n: np.concatenate([x[:1], (1.0 - share) * x[1:] + share * x[:-1]])
+
+
+def both(
+    first: Callable[[np.ndarray, int], np.ndarray], then: Callable[[np.ndarray, int], np.ndarray]
+) -> Callable[[np.ndarray, int], np.ndarray]:
+    return lambda x, n: then(first(x, n), n)
+
+
+def bent(i: np.ndarray) -> np.ndarray:
+    """Currents of channels that are 1 % low at 5 A, with the square of the current."""
+    return i * (1.0 - 0.002 * np.abs(i))
+
+
 def times(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
     return lambda x, n: x * (1.0 + size * each(n))
 
@@ -129,9 +150,10 @@ CHANNELS = {
         "drift in sensor_current", phase_current=times(0.01), phase_current_end=times(0.01)
     ),
     "gain of the voltages by recording": changed("drift in sensor_voltage", phase_voltage=times(0.01)),
-    "voltage of phase b in that of a": changed(
-        "crosstalk in sensor_voltage", phase_voltage=lambda v, n: v + 0.01 * np.outer(v[:, 1], [1.0, 0.0, 0.0])
+    "gain of a phase's voltage by recording": changed(
+        "drift in sensor_voltage", phase_voltage=lambda v, n: v * (1.0 + 0.01 * each(n) * np.array([0.0, 0.0, 1.0]))
     ),
+    "voltage of phase b in that of a": changed("crosstalk in sensor_voltage", phase_voltage=into_a(0.01)),
     "offset of the speed": changed("drift in sensor_speed", rotor_speed=lambda w, n: w + 0.8),
     "zero of the output position": changed("drift in sensor_output", output_position=lambda x, n: x + 8e-4),
     "spikes of the motion": changed(
@@ -140,6 +162,27 @@ CHANNELS = {
     ),
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
+    ),
+    "three faults at once": changed(
+        "drift in sensor_current", "lag in sensor_voltage", "lag in sensor_output",
+        phase_current=plus_on_b(0.02), phase_current_end=plus_on_b(0.02), phase_voltage=late(0.4),
+        output_position=late(0.6),
+    ),
+    "four faults at once": changed(
+        "drift in sensor_current", "crosstalk in sensor_current", "lag in sensor_voltage", "lag in sensor_output",
+        phase_current=both(plus_on_b(0.02), into_a(0.01)), phase_current_end=both(plus_on_b(0.02), into_a(0.01)),
+        phase_voltage=late(0.4), output_position=late(0.6),
+    ),
+    "four others at once": Channel(
+        itself=(
+            "sensor_curve in sensor_current", "crosstalk in sensor_voltage", "drift in sensor_speed",
+            "spikes in position",
+        ),
+        change=lambda r, n: replace(
+            r, phase_current=bent(r.phase_current), phase_current_end=bent(r.phase_current_end),
+            phase_voltage=into_a(0.01)(r.phase_voltage, n), rotor_speed=r.rotor_speed + 0.8,
+            output_position=spiked(0.05)(r.output_position, n),
+        ),
     ),
 }  # fmt: skip
 
