@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from emafault.diagnosis.constancy import PRIOR, log_odds_of_change
-from emafault.diagnosis.fit import Bench
+from emafault.diagnosis.fit import Bench, Fit
+from emafault.diagnosis.search import Choice, Model, Search
 from emafault.equations.diagnose import diagnose
 from emafault.equations.verdict import remainder_sentence
 
@@ -23,12 +24,16 @@ def bench_of(sizes):
 
 
 def fitted(sizes):
-    """Such a bench at its fit, and the set with a spring."""
+    """Such a bench at the optimum of a spring alone, its fit there, and the set with the spring."""
     machine = machine_of(bench_of(sizes))
     bench = Bench(machine, list(machine.recordings))
-    fit = bench.fit()
-    model = fit.search.fit((("load_spring", 0),))
-    return bench, fit, model
+    bench.settle(Model((Choice("load_spring", 0, 1.0),)))
+    whites = bench.linearise(renew=True)
+    normal = bench.normal(whites)
+    reduced = bench.reduce(normal)
+    search = Search(reduced, *bench.candidates(reduced))
+    model = search.fit((("load_spring", 0),))
+    return bench, Fit(bench.values(), whites, bench.carried, [model], normal, search), model
 
 
 def test_one_size_in_all_recordings_speaks_for_an_effect():
