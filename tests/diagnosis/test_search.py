@@ -41,3 +41,13 @@ def test_causes_are_found_behind_a_remainder_that_stands_in_for_them(kind, count
     assert search.run()[0].units == tuple(causes[:count])
     stand_in = search.fit((("remainder:torque", 0),))
     assert search.ranked()[0].log_posterior - stand_in.log_posterior > 12.0  # and not by a hair
+
+
+@pytest.mark.parametrize("proposed", [False, True])
+def test_what_needs_three_forms_of_a_scan_is_a_remainder(proposed):
+    names = ["one", "two", "three"]
+    reduced = marginalise(Normal(names, np.eye(3), np.zeros(3), 0.0), [], np.zeros(0), np.zeros(0), np.zeros(3))
+    units = [Unit(n, "form", ("torque",), [Variant([])], proposed=proposed) for n in names]
+    search = Search(reduced, units, {(n, 0): _candidate([k], 1.0, [n]) for k, n in enumerate(names)})
+    assert np.isfinite(search.log_prior([(n, 0) for n in names[:2]]))
+    assert np.isfinite(search.log_prior([(n, 0) for n in names])) == (not proposed)

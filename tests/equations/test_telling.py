@@ -7,6 +7,7 @@ import pytest
 
 from emafault.diagnosis.described import Described
 from emafault.equations import telling
+from emafault.equations.telling_chain import told_of_chain
 
 from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
@@ -54,3 +55,13 @@ def test_a_wave_of_the_recorded_angle_moves_the_commutations_of_the_point():
 def test_a_wave_of_the_speeds_scale_may_be_one_of_the_angle():
     machine = machine_of({"a.nc": recorded()})
     assert machine.channels("sensor_speed", 1) == ("angle",) and machine.channels("torque", 1) == ()
+
+
+@pytest.mark.parametrize(("of", "said"), [
+    ("all", "voltages differs between recordings, by +0 to +2 % from that in one of them."),
+    ("c", "voltage of phase c differs between recordings, by +1 to +2 %."),
+])  # fmt: skip
+def test_a_gain_of_all_phases_is_told_against_that_in_one_recording(of, said):
+    gains = {f"gain_voltage.{of}@{n}.nc": (0.01 * n, 1e-4) for n in (1, 2)}
+    told = told_of_chain("~gain_voltage", "sensor_voltage", gains, dict.fromkeys(gains, "1"), ACTUATOR)
+    assert told["sentence"].endswith(said)

@@ -4,7 +4,7 @@ Effects whose inclusions reach it only together, one standing in for the other i
 reaches it only together with the undescribed remainder of its equation is told, if it is the likelier.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
@@ -75,7 +75,7 @@ def read(
         steady = 1.0
         for e, p in wanders.items():
             left = f"remainder:{e}"
-            if left not in model.units and not any(_meet(acts.get(u, ()), (e,)) for u in listed):
+            if left not in model.units and not any(meet(acts.get(u, ()), (e,)) for u in listed):
                 inclusion[left] = inclusion.get(left, 0.0) + float(w) * p
                 steady *= 1.0 - p
         left_over = any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units)
@@ -118,7 +118,7 @@ def _or_left(models: Sequence[Model], weights: Iterable[float], form: str, equat
 
     def has(units: Sequence[str]) -> bool:
         left = [u.split(":", 1)[1] for u in units if u.startswith("remainder:")]
-        return form in units or any(_meet(equations, (e,)) for e in left)
+        return form in units or any(meet(equations, (e,)) for e in left)
 
     return sum(float(w) for m, w in zip(models, weights, strict=True) if has(m.units))
 
@@ -134,7 +134,7 @@ def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, 
     used: set[str] = set()
     for size in range(2, MEMBERS + 1):
         for group in combinations(likely, size):
-            if not all(_meet(equations[a], equations[b]) for a, b in combinations(group, 2)):
+            if not all(meet(equations[a], equations[b]) for a, b in combinations(group, 2)):
                 continue
             if used & set(group) or (inclusion[group[0]] > 0.0 and sum(inclusion[e] for e in group) < NAMED):
                 continue
@@ -145,7 +145,7 @@ def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, 
     return tuple(out)
 
 
-def _meet(one: Sequence[str], other: Sequence[str]) -> bool:
+def meet(one: Collection[str], other: Collection[str]) -> bool:
     """Whether two effects act in a common equation; that of one phase is one of the electrical ones."""
     return any(a == b or a.startswith(f"{b}_") or b.startswith(f"{a}_") for a in one for b in other)
 

@@ -13,7 +13,7 @@ from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
-from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, read
+from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, meet, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Model, Search, inclusion
 
@@ -101,7 +101,7 @@ def held_to_account(
         changes |= dict.fromkeys(told, change)
         other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
         sets.add_without(effect, True, sets.log_mass(told) + other)
-    _ask_forms(sets, account, ratios)  # those that are told only now
+    _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
     return models, HeldOut(explored, ratios, changes)
 
@@ -140,8 +140,7 @@ class _Sets:
             yield left[0], incomplete or any(self._is_unexplained(e) for e in left[0])
 
     def _is_unexplained(self, unit: str) -> bool:
-        equations = self.fit.search.units[unit].equations
-        return any(seen.startswith(e) for seen in self.unexplained for e in equations)
+        return meet(self.fit.search.units[unit].equations, self.unexplained)
 
     def untold(self, ratios: Mapping[str, float], kind: str, least: float) -> Iterator[str]:
         """Units of a kind that the sets, as they are by then, give at least a probability, not yet held to account."""

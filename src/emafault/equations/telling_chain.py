@@ -137,10 +137,13 @@ def _drift(fault: Fault) -> Told:
 
 def _gain(fault: Fault) -> Told:
     phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
-    common = phase == "all"
-    gains = [*([0.0] if common else []), *fault.values.values()]
-    ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %{' from that in one of them' * common}"
-    whose = of_phase(fault.channel, "" if common else phase)
+    gains = list(fault.values.values())
+    against = ""
+    if phase == "all":  # told against one recording, which has none
+        phase, against = "", " from that in one of them"
+        gains.append(0.0)
+    ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %{against}"
+    whose = of_phase(fault.channel, phase)
     return Told(f"the gain of the recorded {whose} differs between recordings, {ends}", "drift")
 
 
