@@ -13,7 +13,7 @@ from .linearisation import Carried, Task
 from .model import LISTED
 from .naming import NAMED
 from .point import Place
-from .search import NEAR, OTHER_FORM, Model, Search
+from .search import NEAR, OTHER_FORM, Choice, Model, Search
 from .settling import Settling
 
 ROUNDS = 3
@@ -222,17 +222,19 @@ class Bench(Settling):
         self, whites: list[White], normal: Normal, rounds: int, remainders: bool = True
     ) -> tuple[list[White], Normal, Search]:
         search = self._search(normal, remainders)
+        at_optimum: tuple[Choice, ...] | None = None  # of this set, under the present weights
         for _ in range(rounds):
             best = search.ranked()[0]
             more = remainders and self._carry_own_forms(search)
-            if self._ahead(best, normal) < self.settled and not more:
+            if not more and (best.choices == at_optimum or self._ahead(best, normal) < self.settled):
                 break
             best = self._by_own_variants(self.settle(best, normal))
             if self._refine(best):
                 self.settle(best)
             # weights are those of the first look at a set: no hypothesis gains by what it leaves
-            whites = self.linearise(renew=more or best.units != self.looked_at)
-            self.looked_at = best.units
+            renew = more or best.units != self.looked_at
+            whites = self.linearise(renew=renew)
+            self.looked_at, at_optimum = best.units, None if renew else best.choices
             normal = self.normal(whites)
             search = self._search(normal, remainders)
         return whites, normal, search

@@ -1,12 +1,12 @@
 """Normal equations of a bench at its point: linearised, assembled, and the step that a set would take."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import repeat
 
 import numpy as np
 
+from .bounded import minimum_within
 from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
 from .linear import OWN_FORM, OWN_SHARES, White, assemble, full_model, white_rows
@@ -169,49 +169,40 @@ class NormalEquations(Point):
         return dict(zip(self.nuisances, Definite(A).solve(right).tolist(), strict=True))
 
     def step(self, model: Model, normal: Normal) -> dict[str, float]:
-        """Deviations of the nuisances and of a model's columns at its fit.
+        """Deviations of the nuisances and of a model's columns at its fit, within where their priors have any mass.
 
-        A nuisance that would leave where its prior has any mass is held at its end, what has one side of off is held
-        there, and all others are fitted beside it (an active set; Nocedal and Wright 2006, Numerical Optimization,
-        section 16.5).
+        What has one side of off is fitted on that side.
         """
-        ends = self._ends(model)
-        found = self.nuisance_deviations(normal, model.deviations) | model.deviations
-        held: dict[str, float] = {}
-        while True:
-            within = {n: ends[n](d) if n in ends else self._within_reach(n, d) for n, d in found.items()}
-            over = {n: w for n, w in within.items() if w != found[n] and n not in held}
-            if not over:
-                return found | held
-            held |= over
-            found = self._beside(model, normal, held) | held
+        names = [*self.nuisances, *model.deviations]
+        ends = [self._ends(model).get(n) or self._reach_of(n) for n in names]
+        return dict(zip(names, self._beside(model, normal, names, ends), strict=True))
 
-    def _ends(self, model: Model) -> dict[str, Callable[[float], float]]:
-        """By column of a model's units, what keeps its deviation on its side of off."""
-        out: dict[str, Callable[[float], float]] = {n: float for n in model.deviations}
+    def _ends(self, model: Model) -> dict[str, tuple[float, float]]:
+        """By column of a model's units, the least and the most that it may deviate by: it stays on its side of off."""
+        out = {n: (-np.inf, np.inf) for n in model.deviations}
         units = {u.id: u for u in self.units}
         for c in (c for c in model.choices if c.unit in units):
             variant = self.active(units[c.unit])[c.variant % OTHER_FORM]
             for p, side in zip(variant.parameters, variant.signs or repeat(0), strict=False):
-                if p.secant is None:
-                    out[p.name] = partial(self._on_its_side, p.name, side)
+                if p.secant is None and side:
+                    off = self.prior(p.name)[2]
+                    out[p.name] = (off, np.inf) if side > 0 else (-np.inf, off)
         return out
 
-    def _on_its_side(self, name: str, side: int, deviation: float) -> float:
-        return side * max(side * deviation, side * self.prior(name)[2]) if side else deviation
-
-    def _beside(self, model: Model, normal: Normal, held: Mapping[str, float]) -> dict[str, float]:
-        """Deviations of nuisances and of a model's columns beside those that are ``held``."""
-        free = [n for n in (*self.nuisances, *model.deviations) if n not in held]
-        mean = np.array([self.prior(n)[0] for n in free])
-        sd = self.widths(free, model)
-        inside = set(free)
+    def _beside(
+        self, model: Model, normal: Normal, names: Sequence[str], ends: Sequence[tuple[float, float]]
+    ) -> list[float]:
+        """Deviations of columns of a model within their ends, all others off."""
+        mean = np.array([self.prior(n)[0] for n in names])
+        sd = self.widths(names, model)
+        inside = set(names)
         rest = [n for n in normal.names if n not in inside]
-        d = np.array([held[n] if n in held else self.prior(n)[2] for n in rest])
-        f, r = (np.array([normal.index[n] for n in names], int) for names in (free, rest))
+        d = np.array([self.prior(n)[2] for n in rest])
+        f, r = (np.array([normal.index[n] for n in of], int) for of in (names, rest))
         A = normal.H[np.ix_(f, f)] + np.diag(1.0 / sd**2)
-        found = Definite(A).solve(mean / sd**2 - normal.g[f] - normal.H[np.ix_(f, r)] @ d)
-        return dict(zip(free, found.tolist(), strict=True))
+        right = mean / sd**2 - normal.g[f] - normal.H[np.ix_(f, r)] @ d
+        low, high = np.array(ends, float).reshape(-1, 2).T
+        return minimum_within(A, right, low, high).tolist()
 
     def widths(self, columns: Sequence[str], model: Model) -> np.ndarray:
         """(column,) standard deviations of the priors that a model's columns have in it, or nuisances have."""

@@ -138,8 +138,8 @@ class Point:
                 out[n] = (own - p.vanishes) * (factor * float(np.exp(np.clip(d / u, -1.0, 1.0))) - 1.0)
         return out
 
-    def _within_reach(self, name: str, deviation: float) -> float:
-        """A deviation no further than the prior has any mass: a model that lacks the cause asks for more."""
+    def _reach_of(self, name: str) -> tuple[float, float]:
+        """Least and largest deviation where the prior has any mass: a model that lacks the cause asks for more."""
         mean, sd, _ = self.prior(name)
         low, high = mean - self.reach * sd, mean + self.reach * sd
         p = self.parameters[name]
@@ -148,7 +148,7 @@ class Point:
             least = (p.mean - self.reach * p.sd - p.vanishes) / factor
             if least > 0.0:
                 low = min(low, u * float(np.log(least)))
-        return float(min(max(deviation, low), high))
+        return low, high
 
     def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:
         """An effect found along a secant gets parameters of its own."""

@@ -12,21 +12,32 @@ from .point import Place, is_parameter
 from .search import OTHER_FORM, Model, Search
 
 STEPS = 3  # of a set to its own optimum
-HALVINGS = 6  # of a step after which a set fits worse than before
+SHORTER = (0.1, 0.5)  # least and most of a step after which a set fits worse, that is tried next
 FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
 
 
 @dataclass(frozen=True)
 class Began:
-    """Where a step began: the point, and its misfit (nats) with the noise's part and, where that is known, without."""
+    """Where a step began: the point, its misfit (nats) with the noise's part and, where that is known, without, and the
+    log evidence that the step promised."""
 
     point: dict[str, float]
     misfits: tuple[float, float | None]
+    promised: float
 
-    def holds(self, after: tuple[float, float | None], slack: float) -> bool:
-        """Whether the misfit after the step is no larger."""
+    def rise(self, after: tuple[float, float | None]) -> float:
+        """By how much the misfit is larger after the step."""
         whole, less = self.misfits
-        return after[1] < less + slack if less is not None and after[1] is not None else after[0] < whole + slack
+        return after[1] - less if less is not None and after[1] is not None else after[0] - whole
+
+    def shorter(self, share: float, rise: float) -> float:
+        """Share of the step to be tried after ``share`` of it: the minimum of the parabola through both misfits with
+        the slope that was promised (Nocedal and Wright 2006, section 3.5)."""
+        least, most = SHORTER
+        if not np.isfinite(self.promised):
+            return most * share
+        slope = 2.0 * self.promised * share
+        return share * min(max(0.5 * slope / (rise + slope), least), most)
 
 
 @dataclass
@@ -42,9 +53,9 @@ class Inserted:
     own: dict[str, dict[str, float]]
 
 
-def halfway(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
-    """The point in the middle of two."""
-    return {n: 0.5 * (one[n] + other[n]) for n in other}
+def between(one: Mapping[str, float], other: Mapping[str, float], share: float) -> dict[str, float]:
+    """The point that lies a share of the way from one to another."""
+    return {n: one[n] + share * (x - one[n]) for n, x in other.items()}
 
 
 class Settling(NormalEquations):
@@ -72,9 +83,10 @@ class Settling(NormalEquations):
         began: Began | None = None
         if normal is not None:
             begun = self.here()
-            if self.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
-                began = Began(dict(self.point), self._misfits(normal, model, True))
+            at, misfits = dict(self.point), self._misfits(normal, model, True)
             ahead = to_come = self.move(model, normal)
+            if begun.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
+                began = Began(at, misfits, ahead)
             if ahead < self.settled:
                 return model
             new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun.on}
@@ -86,11 +98,12 @@ class Settling(NormalEquations):
                 if to_come < enough:
                     break
                 found, at_point, misfits = self._nearer(model, corrected, began)
-                began, ended = Began(dict(self.point), misfits) if self.on <= set(model.units) else None, began
-                if ended is not None and began is not None and ended.point == began.point:
+                at, keeps = dict(self.point), self.on <= set(model.units)
+                if began is not None and keeps and began.point == at:
                     to_come = 0.0
                     break
                 before, ahead = ahead, self.move(found, at_point)
+                began = Began(at, misfits, ahead) if keeps else None
                 # steps shrink on at least as they did
                 to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
             left, to_come = to_come, np.inf
@@ -102,17 +115,19 @@ class Settling(NormalEquations):
     def _nearer(
         self, model: Model, corrected: bool, began: Began | None
     ) -> tuple[Model, Normal, tuple[float, float | None]]:
-        """A set fitted at the present point, or nearer to where the last step began if it fits worse here than there,
-        in the end at that point, which is where the point then lies (backtracking; Nocedal and Wright 2006, section
-        3.1); and its misfits there."""
-        for halving in range(HALVINGS + 1):
+        """A set fitted at the present point, or nearer to where the last step began if it fits worse than there, in the
+        end at that point once a shorter step promises nothing (backtracking; Nocedal and Wright 2006, section 3.1); and
+        its misfits where the point then lies."""
+        share, whole = 1.0, dict(self.point)
+        while True:
             found, at_point = self._fitted(model, corrected)
             misfits = self._misfits(at_point, found, corrected)
-            if began is None or halving == HALVINGS or began.holds(misfits, self.settled):
-                break
-            last = halving == HALVINGS - 1
-            self.point = dict(began.point) if last else halfway(began.point, self.point)
-        return found, at_point, misfits
+            if began is None or share == 0.0 or (rise := began.rise(misfits)) < self.settled:
+                return found, at_point, misfits
+            share = began.shorter(share, rise)
+            if 2.0 * share * min(began.promised, FAR) < self.settled:
+                share = 0.0
+            self.point = between(began.point, whole, share)
 
     def _misfits(self, normal: Normal, model: Model, corrected: bool) -> tuple[float, float | None]:
         """Half the squared misfit of a set at the present point (nats), with that of the parameters from their priors,
@@ -120,7 +135,8 @@ class Settling(NormalEquations):
 
         Columns beside the point, which the set is linear in, are at their best.
         """
-        apart = sum((mean / sd) ** 2 for mean, sd, _ in (self.prior(n) for n in normal.names if is_parameter(n)))
+        own = [*self.nuisances, *(n for n in model.deviations if is_parameter(n))]
+        apart = sum((mean / sd) ** 2 for mean, sd, _ in map(self.prior, own))
         misfit = 0.5 * float(normal.c + apart) - self.gained_beside(model, normal)
         return misfit + 0.5 * normal.own, misfit if corrected else None
 

@@ -10,7 +10,7 @@ from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import read
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Model
+from ..diagnosis.search import Choice, Model
 from ..io.recording import Recording
 from . import electrical
 from .held_out import Explored, HeldOut
@@ -63,7 +63,8 @@ def shrinks(
     units = {u.id: u for u in explored.bench.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
-    at_null = nominal_unit.reduce(nominal_unit.normal(nominal_unit.linearise()))
+    left = Model(tuple(Choice(f"remainder:{e}", 0, 1.0) for e in equations))
+    at_null = nominal_unit.reduce(nominal_unit.normal(nominal_unit.linearise(left), left))
     median, middle = placebo(at_null, base, equations, len(mine))
     signal: dict[str, float | None] = {
         "nominal": rms(at_nominal), "recalibrated": rms(base),
