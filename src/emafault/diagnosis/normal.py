@@ -168,31 +168,14 @@ class NormalEquations(Point):
         right = mean / sd**2 - normal.g[n] - normal.H[np.ix_(n, r)] @ d
         return dict(zip(self.nuisances, Definite(A).solve(right).tolist(), strict=True))
 
-    def step(self, model: Model, normal: Normal) -> dict[str, float]:
-        """Deviations of the nuisances and of a model's columns at its fit, within where their priors have any mass.
+    def step(self, model: Model, normal: Normal) -> tuple[dict[str, float], float]:
+        """Deviations of the nuisances and of a model's columns at its fit, within where priors have any mass and no
+        further than one step may go; and the log evidence that is gained there by the columns that are parameters.
 
-        What has one side of off is fitted on that side.
+        Columns beside the point, which the set is linear in, are at their best before the step too.
         """
         names = [*self.nuisances, *model.deviations]
-        ends = [self._ends(model).get(n) or self._reach_of(n) for n in names]
-        return dict(zip(names, self._beside(model, normal, names, ends), strict=True))
-
-    def _ends(self, model: Model) -> dict[str, tuple[float, float]]:
-        """By column of a model's units, the least and the most that it may deviate by: it stays on its side of off."""
-        out = {n: (-np.inf, np.inf) for n in model.deviations}
-        units = {u.id: u for u in self.units}
-        for c in (c for c in model.choices if c.unit in units):
-            variant = self.active(units[c.unit])[c.variant % OTHER_FORM]
-            for p, side in zip(variant.parameters, variant.signs or repeat(0), strict=False):
-                if p.secant is None and side:
-                    off = self.prior(p.name)[2]
-                    out[p.name] = (off, np.inf) if side > 0 else (-np.inf, off)
-        return out
-
-    def _beside(
-        self, model: Model, normal: Normal, names: Sequence[str], ends: Sequence[tuple[float, float]]
-    ) -> list[float]:
-        """Deviations of columns of a model within their ends, all others off."""
+        low, high = self._ends(model, names)
         mean = np.array([self.prior(n)[0] for n in names])
         sd = self.widths(names, model)
         inside = set(names)
@@ -201,8 +184,29 @@ class NormalEquations(Point):
         f, r = (np.array([normal.index[n] for n in of], int) for of in (names, rest))
         A = normal.H[np.ix_(f, f)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[f] - normal.H[np.ix_(f, r)] @ d
-        low, high = np.array(ends, float).reshape(-1, 2).T
-        return minimum_within(A, right, low, high).tolist()
+        found = minimum_within(A, right, low, high)
+        gained = float(right @ found - 0.5 * found @ A @ found)
+        return dict(zip(names, found.tolist(), strict=True)), gained - self.gained_beside(model, normal)
+
+    def _ends(self, model: Model, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """(column,) least and largest deviations that a step may take columns of a model to: what has one side of off
+        stays on it, and what is not linear is approached in steps."""
+        ends = {n: self._reach_of(n) for n in self.nuisances}
+        units = {u.id: u for u in self.units}
+        for c in (c for c in model.choices if c.unit in units):
+            unit = units[c.unit]
+            bent = unit.on is not None and unit.id in self.on and len(unit.variants) > 1
+            variant = self.active(unit)[c.variant % OTHER_FORM]
+            for p, side in zip(variant.parameters, variant.signs or repeat(0), strict=False):
+                if p.secant is None:
+                    off, most = self.prior(p.name)[2], p.sd if bent else np.inf
+                    ends[p.name] = (max(off, -most) if side > 0 else -most, min(off, most) if side < 0 else most)
+        every = np.array([ends.get(n, (-np.inf, np.inf)) for n in names], float).reshape(-1, 2)
+        for k, n in enumerate(names):
+            if is_parameter(n) and self.parameters[n].vanishes is not None:
+                u = abs(self._factor(n)[0])
+                every[k] = np.clip(every[k], -u, u)
+        return every[:, 0], every[:, 1]
 
     def widths(self, columns: Sequence[str], model: Model) -> np.ndarray:
         """(column,) standard deviations of the priors that a model's columns have in it, or nuisances have."""
@@ -292,10 +296,9 @@ class NormalEquations(Point):
 
         Returns
         -------
-        log evidence that the step promises (Newton decrement; Boyd and Vandenberghe 2004, Convex Optimization, section
-        9.5.1)
+        log evidence that the step promises; infinite where it switches an effect on that was a secant
         """
-        given = self.step(model, normal)
+        given, promised = self.step(model, normal)
         inside = {c.unit: c for c in model.choices}
         on: set[str] = set()
         moved = {n: given[n] for n in self.nuisances}
@@ -308,11 +311,8 @@ class NormalEquations(Point):
                 if p.secant is not None:
                     switched.append((unit, p, d))
                 else:
-                    if unit.on is not None and unit.id in self.on and len(unit.variants) > 1:
-                        d = float(np.clip(d, -p.sd, p.sd))  # what is not linear is approached in steps
                     moved[p.name] = d
             on.add(unit.id)
-        decrement = np.inf if switched else self._decrement(moved, normal)
         found = self.after(moved)
         for unit in self.units:
             if unit.id not in inside:
@@ -321,14 +321,7 @@ class NormalEquations(Point):
         for unit, p, d in switched:
             self._switch_on(unit, p, d)
         self.on = on
-        return decrement
-
-    def _decrement(self, moved: Mapping[str, float], normal: Normal) -> float:
-        names = [n for n in moved if n in normal.index]
-        k = np.array([normal.index[n] for n in names], int)
-        d = np.array([moved[n] for n in names])
-        sd = np.array([self.prior(n)[1] for n in names])
-        return float(0.5 * (d @ normal.H[np.ix_(k, k)] @ d + np.sum((d / sd) ** 2)))
+        return np.inf if switched else promised
 
     def gained_beside(self, model: Model, normal: Normal) -> float:
         """Log evidence that a model's columns which are no parameters gain at the point (variable projection; Golub and

@@ -100,6 +100,15 @@ class MeasuredBench(Bench):
             self.point[n] = float(np.clip(self.point[n], low, high))
         return ahead
 
+    def _ends(self, model, names):
+        """See ``Bench``; a step ends where parameters are possible."""
+        low, high = super()._ends(model, names)
+        for k, n in enumerate(names):
+            least, most = self.machine.bounds.get(n, (-np.inf, np.inf))
+            at = self.point.get(n, 0.0)
+            low[k], high[k] = max(low[k], least - at), min(high[k], most - at)
+        return low, high
+
     def _carry_own_forms(self, search: Search) -> bool:
         """See ``Bench``: effects of good sets alone."""
         chosen: dict[str, dict[str, float]] = {}
