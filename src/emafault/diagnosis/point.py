@@ -138,6 +138,15 @@ class Point:
                 out[n] = (own - p.vanishes) * (factor * float(np.exp(np.clip(d / u, -1.0, 1.0))) - 1.0)
         return out
 
+    def _deviation_to(self, name: str, value: float) -> float:
+        """Deviation of a parameter of its own, not one beyond a tolerance, at which it has a value."""
+        p = self.parameters[name]
+        if p.vanishes is None:
+            return value - self.point.get(name, p.off)
+        u, factor = self._factor(name)
+        share = (value - p.vanishes) / factor
+        return u * float(np.log(share)) if share > 0.0 else -np.inf * np.sign(u)
+
     def _reach_of(self, name: str) -> tuple[float, float]:
         """Least and largest deviation where the prior has any mass: a model that lacks the cause asks for more."""
         mean, sd, _ = self.prior(name)

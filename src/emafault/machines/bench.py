@@ -104,9 +104,9 @@ class MeasuredBench(Bench):
         """See ``Bench``; a step ends where parameters are possible."""
         low, high = super()._ends(model, names)
         for k, n in enumerate(names):
-            least, most = self.machine.bounds.get(n, (-np.inf, np.inf))
-            at = self.point.get(n, 0.0)
-            low[k], high[k] = max(low[k], least - at), min(high[k], most - at)
+            if n in self.machine.bounds:
+                least, most = (self._deviation_to(n, x) for x in self.machine.bounds[n])
+                low[k], high[k] = max(low[k], least), min(high[k], most)
         return low, high
 
     def _carry_own_forms(self, search: Search) -> bool:
