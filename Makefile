@@ -11,6 +11,8 @@ export PATH := $(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
+# pip compiles nothing, which takes as long as all else of it: what is imported is compiled then, and kept
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: study test
 
@@ -23,5 +25,5 @@ test: .venv/ready
 .venv/ready: requirements.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, PYTHON=... names one") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv .venv
-	pip install --quiet --disable-pip-version-check -r requirements.txt
+	pip install --quiet --disable-pip-version-check --no-compile -r requirements.txt
 	touch $@

@@ -6,6 +6,7 @@ import pytest
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Choice, Model
+from emafault.diagnosis.settling import Began, between
 
 ROWS = 4000
 
@@ -72,6 +73,42 @@ def test_a_step_after_which_a_set_fits_worse_is_shortened():
     assert bench._fitted(model, corrected=False)[0].deviations["c"] > 9.0
     bench.settle(model, steps=6)
     assert bench.point["c"] == pytest.approx(3.0, abs=0.01)
+
+
+def test_what_is_approached_in_steps_has_the_others_fitted_beside_it_and_the_step_holds_what_it_promises():
+    """Cut off after the joint fit, the step would leave the nuisance where it makes up for a cause of its full size."""
+
+    class Stepped(Machine):
+        c = Parameter("c", 0.0, 0.0, 0.5)
+        parameters = {"a": Parameter("a", 0.0, 0.0, 10.0), "c": c}  # noqa: RUF012
+        units = (Unit("c", "structural", ("torque",), [Variant([c]), Variant([c])], on=Variant([c])),)
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other = np.random.default_rng(3).standard_normal((3, ROWS))
+            columns = {"a": one, "c": one + 0.3 * other}
+            residual = noise + (values["a"] + 4.0) * one + (values["c"] - 5.0) * columns["c"]
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    bench, model = Bench(Stepped(), ["r"]), Model((Choice("c", 0, 1.0),))
+    bench.on = {"c"}
+    found, normal = bench._fitted(model, corrected=False)
+    assert found.deviations["c"] > 2.0
+    before = bench._misfits(normal, found, False)[0]
+    promised = bench.move(found, normal)
+    again, at_point = bench._fitted(model, corrected=False)
+    assert bench.point["c"] == 0.5 and abs(bench.point["a"] - 0.5) < 0.2
+    assert before - bench._misfits(at_point, again, False)[0] == pytest.approx(promised, rel=1e-6)
+    assert abs(at_point.g[at_point.index["a"]]) < 0.01 * at_point.H[0, 0]
+
+
+def test_a_step_is_shortened_to_the_lowest_point_of_the_parabola():
+    """Of a misfit with the slope -2 promised and the value at the whole step, here 10 (1 - 3 s)^2 / 9, least at 1/3."""
+    began = Began({"a": 0.0}, (10.0 / 9.0, None), promised=10.0 / 3.0)
+    assert began.rise((40.0 / 9.0, None)) == pytest.approx(30.0 / 9.0)
+    assert began.shorter(1.0, 30.0 / 9.0) == pytest.approx(1.0 / 3.0)
+    assert began.shorter(0.5, 1e9) == pytest.approx(0.05) and began.shorter(0.5, 0.0) == pytest.approx(0.25)
+    assert Began({}, (0.0, None), promised=np.inf).shorter(0.2, 1.0) == pytest.approx(0.1)
+    assert between({"a": 1.0}, {"a": 3.0}, 0.25) == {"a": 1.5}
 
 
 def test_one_of_variants_that_look_alike_near_off_is_the_best_at_its_own_optimum():

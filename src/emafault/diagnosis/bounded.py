@@ -5,7 +5,7 @@ import numpy as np
 from .evidence import Definite
 
 TURNS = 10  # times the number of variables, after which what has been reached is taken
-ALIKE = 1e-9  # of a variable's own curvature times its standard deviation, that a slope may be for none
+LEVEL = 1e-6  # slope over the root of a variable's own curvature, up to which there is nothing to be gained
 
 
 def minimum_within(A: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -37,7 +37,7 @@ def minimum_within(A: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.n
         x[k] += along
         inward = side * (A @ x - right) / np.sqrt(np.diag(A))  # positive: the minimum lies inside
         worst = int(np.argmax(inward))
-        if inward[worst] <= ALIKE * np.sqrt(np.diag(A)[worst]):
+        if inward[worst] <= LEVEL:
             break
         side[worst] = 0
     return x

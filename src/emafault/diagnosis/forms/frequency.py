@@ -1,10 +1,11 @@
 """A wave of a fixed frequency, its phase another in each recording."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..left import Found, Left, Shape, gain
+from ..model import Block
 from .spectrum import above, refined
 
 AXIS = "phase of the wave (rad)"  # of its picture
@@ -37,22 +38,30 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
         highest = b.coordinates.get("highest_frequency", HIGHEST / np.median(np.diff(t)))
         known = (frequencies > PERIODS / (t[-1] - t[0])) & (frequencies < highest)
         total += np.where(known, ratio, 0.0)
-    shape = {"frequency": float(frequencies[int(np.argmax(total))])}
-    return shape, _value(left, driver, shape)
+    highest_line = float(frequencies[int(np.argmax(total))])
+    return {"frequency": highest_line}, _values(left, driver, [highest_line])[0]
 
 
 def _step(left: Left) -> float:
     return min(float(np.median(np.diff(b.coordinates["time"]))) for b in left.blocks)
 
 
-def _value(left: Left, driver: int, shape: Shape) -> float:
-    return sum(gain(*p) for p in left.each(lambda b: columns(b.coordinates, shape), driver))
+def _values(left: Left, driver: int, frequencies: Sequence[float]) -> list[float]:
+    """What a wave of each of several frequencies explains."""
+
+    def of(b: Block) -> np.ndarray:
+        return np.concatenate([columns(b.coordinates, {"frequency": f}) for f in frequencies])
+
+    out = np.zeros(len(frequencies))
+    for g, G in left.each(of, driver):
+        out += [gain(g[k : k + 2], G[k : k + 2, k : k + 2]) for k in range(0, len(g), 2)]
+    return out.tolist()
 
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The frequency."""
-    f, deviation = refined(shape["frequency"], 0.5 / left.longest, lambda x: _value(left, driver, {"frequency": x}))
-    value = _value(left, driver, {"frequency": f})
+    f, deviation = refined(shape["frequency"], 0.5 / left.longest, lambda x: _values(left, driver, x))
+    (value,) = _values(left, driver, [f])
     return [Found((("frequency", f, deviation, "Hz"),), value, max(1.0, left.longest * HIGHEST / _step(left)))]
 
 

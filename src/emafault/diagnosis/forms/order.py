@@ -1,10 +1,11 @@
 """A wave along the angle of the rotor, a whole number of times a turn or not, in phase over all recordings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..left import Found, Left, Shape, beside_first, gain
+from ..model import Block
 from .spectrum import above, refined
 
 AXIS = "phase of the wave (rad)"  # of its picture
@@ -46,7 +47,8 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     ratio[(orders < 2.0 / turns) | (orders > highest)] = 0.0
     whole = np.arange(1.0, np.floor(highest) + 1.0)
     tried = [float(orders[int(np.argmax(ratio))]), float(max(whole, key=lambda n: power[round(n * size / CELLS)]))]
-    return max((({"order": n}, _value(left, driver, {"order": n})) for n in tried), key=lambda x: x[1])
+    value, order = max(zip(_values(left, driver, tried), tried, strict=True))
+    return {"order": order}, value
 
 
 def _span(left: Left) -> tuple[float, float]:
@@ -56,24 +58,27 @@ def _span(left: Left) -> tuple[float, float]:
     return float(first), float((max(a.max() for a in angles) - first) / (2.0 * np.pi))
 
 
-def _value(left: Left, driver: int, shape: Shape) -> float:
-    """What a wave explains beside a constant: over a few turns its mean is not zero."""
+def _values(left: Left, driver: int, orders: Sequence[float]) -> list[float]:
+    """What a wave of each of several orders explains beside a constant: over a few turns its mean is not zero."""
 
-    def beside_constant(b):
-        return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, shape)])
+    def beside_constant(b: Block) -> np.ndarray:
+        return np.vstack([np.ones(len(b.residual)), *(columns(b.coordinates, {"order": n}) for n in orders)])
 
-    return gain(*beside_first(*left.products(beside_constant, driver)))
+    g, G = left.products(beside_constant, driver)
+    each = ([0, k, k + 1] for k in range(1, len(g), 2))
+    return [gain(*beside_first(g[k], G[np.ix_(k, k)])) for k in each]
 
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The order itself, and the whole number next to it: what turns with the rotor is as likely as all others."""
     _, turns = _span(left)
-    order, deviation = refined(shape["order"], 0.5 / turns, lambda x: _value(left, driver, {"order": x}))
+    order, deviation = refined(shape["order"], 0.5 / turns, lambda x: _values(left, driver, x))
     tried = [((("order", order, deviation, "1"),), max(1.0, 2.0 * HIGHEST * turns))]
     whole = float(np.round(order))
     if whole >= 1.0 and abs(order - whole) < 1.0 / turns:
         tried.append(((("order", whole, 0.0, "1"),), 2.0 * HIGHEST))
-    return [Found(s, _value(left, driver, {"order": s[0][1]}), among) for s, among in tried]
+    values = _values(left, driver, [s[0][1] for s, _ in tried])
+    return [Found(s, value, among) for (s, among), value in zip(tried, values, strict=True)]
 
 
 def told(values: np.ndarray) -> dict[str, float]:

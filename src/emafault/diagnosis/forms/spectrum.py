@@ -1,6 +1,6 @@
 """Lines in a spectrum: how far a power stands above what is around it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -21,12 +21,12 @@ def _medians(parts: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([np.median(np.array(some), axis=1) for some in same])
 
 
-def refined(at: float, half: float, likelihood: Callable[[float], float]) -> tuple[float, float]:
-    """Where a log likelihood near ``at`` is largest, and its standard deviation there."""
+def refined(at: float, half: float, likelihood: Callable[[Sequence[float]], list[float]]) -> tuple[float, float]:
+    """Where a log likelihood, of several values at once, is largest near ``at``, and its standard deviation there."""
     best, deviation = at, half
     for _ in range(3):
         grid = best + half * np.linspace(-1.0, 1.0, 5)
-        values = np.array([likelihood(x) for x in grid])
+        values = np.array(likelihood(grid.tolist()), float)
         k = int(np.clip(np.argmax(values), 1, len(grid) - 2))
         curvature = (values[k - 1] - 2.0 * values[k] + values[k + 1]) / (grid[1] - grid[0]) ** 2
         best, half = float(grid[k]), half / 2.0
