@@ -25,7 +25,7 @@ def minimum_within(A: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.n
         held = np.flatnonzero(side)
         along = Definite(A[np.ix_(k, k)]).solve(right[k] - A[np.ix_(k, held)] @ x[held]) - x[k] if len(k) else x[k]
         room = np.where(along > 0.0, high[k] - x[k], low[k] - x[k])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             share = np.where(along != 0.0, room / along, np.inf)
         first = int(np.argmin(share)) if len(k) else 0
         if len(k) and share[first] < 1.0:
