@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from emafault.diagnosis.linear import White, assemble, compressed_columns, own_columns
+from emafault.diagnosis.linear import White, assemble, compressed_columns, correct, own_columns
 from emafault.diagnosis.model import Block
+from emafault.diagnosis.whitening import Weights, products
 
 ROWS, DRAWS, NOISE = 400, 300, 1.5
 
@@ -58,3 +59,16 @@ def test_a_form_is_seen_where_noise_averages_out():
         seen[name] = own_columns(block, "load", {"load.T": 0.9})[0]
     assert seen["white"] == []
     assert seen["differenced"] == ["own.load.torque.0", "own.load.torque.1"]
+
+
+def test_a_column_whose_products_underflow_says_nothing():
+    """Edges that a displacement takes far from where commutations may be have columns of some 1e-160."""
+    rng = np.random.default_rng(6)
+    columns = [rng.standard_normal(200), 1e-160 * rng.standard_normal(200), rng.standard_normal(200)]
+    weights = Weights(np.ones(200, bool), np.zeros(0), np.ones(200))
+    gram = products(np.ones((1, 200)), weights.usable, columns, weights)
+    assert gram[0, 0] > 100.0 and not gram[1].any() and not gram[:, 1].any()
+    white = White("r", "torque", ["a", "b"], gram, 200)
+    correct(white, 0.1 * gram)
+    normal = assemble([white], ["a", "b"], {})
+    assert np.isfinite(normal.H).all() and np.isfinite(normal.g).all() and normal.H[1, 1] == 0.0
