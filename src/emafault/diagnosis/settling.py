@@ -13,7 +13,7 @@ from .search import OTHER_FORM, Model, Search
 
 STEPS = 3  # of a set to its own optimum
 SHORTER = (0.1, 0.5)  # least and most of a step after which a set fits worse, that is tried next
-FAR = 1e3  # log evidence that the next step will promise, beyond which its own bias does not matter
+FAR = 1e3  # log evidence that a step promises, beyond which its own bias does not matter, nor by how much
 
 
 @dataclass(frozen=True)
