@@ -11,7 +11,7 @@ export PATH := $(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
-# pip compiles nothing, which takes as long as all else of it: what is imported is compiled then, and kept
+# pip installs without compiling, which is quicker; Python compiles a module when it is first imported, and keeps that
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: study test

@@ -67,8 +67,8 @@ def test_a_column_whose_products_underflow_says_nothing():
     columns = [rng.standard_normal(200), 1e-160 * rng.standard_normal(200), rng.standard_normal(200)]
     weights = Weights(np.ones(200, bool), np.zeros(0), np.ones(200))
     gram = products(np.ones((1, 200)), weights.usable, columns, weights)
-    assert gram[0, 0] > 100.0 and not gram[1].any() and not gram[:, 1].any()
+    assert 0.0 < gram[1, 1] < 1e-300 < 100.0 < gram[0, 0]
     white = White("r", "torque", ["a", "b"], gram, 200)
     correct(white, 0.1 * gram)
     normal = assemble([white], ["a", "b"], {})
-    assert np.isfinite(normal.H).all() and np.isfinite(normal.g).all() and normal.H[1, 1] == 0.0
+    assert np.isfinite(normal.H).all() and np.isfinite(normal.g).all() and normal.H[1, 1] < 1e-300

@@ -8,7 +8,7 @@ import numpy as np
 from ..compiled import compiled
 from .evidence import Definite, Normal, factored
 from .model import Block
-from .whitening import NOTHING, OUTLIER, Weights, coloured, filtered, products, substituted
+from .whitening import OUTLIER, Weights, coloured, filtered, products, substituted
 
 OWN_FORM = 0.3 / np.sqrt(3.0)  # of an effect's size, each of these functions
 OWN_SHARES = (1.0, 0.2)  # of that: as far from the library's as a form is, or near it
@@ -16,6 +16,7 @@ SEEN = 4.0  # squared size of its white rows, from which an effect's form in a b
 MOST_NOISE = 0.9  # of a column's power that may be taken for noise
 FEW = 30  # rows
 ROUNDING = 1e-10  # of a unit diagonal
+UNDERFLOW = 1e-200  # squared size of a column in units of the noise, below which its products are no numbers
 
 
 @dataclass
@@ -269,7 +270,7 @@ def _as_sure(H: np.ndarray, g: np.ndarray, noise: np.ndarray) -> tuple[np.ndarra
         return H, g
     U = H + noise
     # along what the data say nothing of, U and N are rounding, whose ratio must not count
-    U[np.diag_indices_from(U)] += np.where(np.diag(U) > NOTHING, ROUNDING * np.diag(U), 1.0)
+    U[np.diag_indices_from(U)] += np.where(np.diag(U) > UNDERFLOW, ROUNDING * np.diag(U), 1.0)
     solved = Definite(U).solve(np.column_stack([noise[:, noisy], g]))
     inner = noise[noisy][:, noisy] - noise[noisy] @ solved[:, :-1]
     H, g = H.copy(), g.copy()

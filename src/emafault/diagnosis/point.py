@@ -153,10 +153,8 @@ class Point:
         low, high = mean - self.reach * sd, mean + self.reach * sd
         p = self.parameters[name]
         if p.vanishes is not None and p.alias is None:  # a tolerance may be one of the value, or of its logarithm
-            u, factor = self._factor(name)
-            least = (p.mean - self.reach * p.sd - p.vanishes) / factor
-            if least > 0.0:
-                low = min(low, u * float(np.log(least)))
+            least = self._deviation_to(name, p.mean - self.reach * p.sd)
+            low = min(low, least) if np.isfinite(least) else low
         return low, high
 
     def _switch_on(self, unit: Unit, p: Parameter, amount: float) -> None:

@@ -15,7 +15,6 @@ LAGS = 48  # of its spectrum's estimate
 TILE = 1500  # rows that are whitened together
 GRID = 128  # frequencies at which it is looked at
 WANDERING = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)  # shares of an innovation that a slow level may follow by
-NOTHING = 1e-200  # squared size of a column, in units of the noise, below which its products underflow
 QUIETEST = 0.05  # of the mean variance, that most rows may have
 LOCAL = 150  # rows whose variance is estimated together
 
@@ -166,8 +165,6 @@ def products(lower: np.ndarray, usable: np.ndarray, columns: Sequence, weights: 
             scale,
         )  # fmt: skip
         out += rows.T @ rows
-    nothing = np.diag(out) < NOTHING
-    out[nothing], out[:, nothing] = 0.0, 0.0
     return out
 
 
