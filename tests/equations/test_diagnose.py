@@ -71,6 +71,7 @@ def test_an_effect_is_named_with_its_size(cogging):
 
 
 COARSE = {
+    "currents": ({"phase_current": 0.05, "phase_current_end": 0.05}, {}, "sensor_current"),
     "currents beside an effect": ({"phase_current": 0.05, "phase_current_end": 0.05}, COGGING, "sensor_current"),
     "output beside an effect": ({"output_position": 1e-4}, COGGING, "position"),
     "encoder of 4096 counts beside an effect": ({"rotor_angle": 2.0 * np.pi / 4096.0}, COGGING, None),
@@ -194,9 +195,10 @@ def test_an_angle_that_lags_is_told_and_undone(lag, tmp_path):
         assert np.std(got.rotor_angle - r.rotor_angle) < 0.1 * np.std(late[name].rotor_angle - r.rotor_angle)
 
 
-def test_currents_that_lag_are_told():
+@pytest.mark.parametrize("lag", [0.7, 1.0])
+def test_currents_that_lag_are_told(lag):
     def lagging(x):
-        return np.vstack([x[:1], x[:-1]])
+        return x + lag * (np.vstack([x[:1], x[:-1]]) - x)
 
     late = {
         n: replace(r, phase_current=lagging(r.phase_current), phase_current_end=lagging(r.phase_current_end))
@@ -205,7 +207,7 @@ def test_currents_that_lag_are_told():
     verdict = verdict_of(late)
     assert verdict["which"][0]["effects"] == ["cogging"]
     told = next(d for d in verdict["discovered"] if d["equation"] == "sensor_current")
-    assert told["form"] == "lag" and next(iter(told["parameters"].values()))["value"] == pytest.approx(1.0, rel=0.1)
+    assert told["form"] == "lag" and next(iter(told["parameters"].values()))["value"] == pytest.approx(lag, rel=0.1)
 
 
 def test_a_gain_that_differs_between_recordings_is_told_and_undone(tmp_path):
