@@ -77,7 +77,30 @@ def test_beside_a_form_that_is_not_confirmed_no_set_of_that_equation_is_the_true
     for ratio, unexplained in ((-4.1, {"inertia"}), (36.5, set())):
         both = fit((("inertia", 0), ("~function", 0)))
         sets = held_out._Sets(None, SimpleNamespace(models=[both], search=search))
-        account = SimpleNamespace(ratio=lambda _, ratio=ratio: ratio, instead=lambda _: 0.0)
+        account = SimpleNamespace(ratio=lambda _, ratio=ratio: ratio, instead=lambda _: 0.0, let_go=lambda *_: None)
         held_out._ask_forms(sets, account, {})
         assert {u for u in ("inertia", "voltage_gain") if sets._is_unexplained(u)} == unexplained
         assert any("~function" in m.units for m in sets.models) == (ratio > 0.0)
+
+
+def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
+    """Two causes that explain the same: once one is not told, the other is compared with nothing in its place."""
+    alike = {"unit_calibration", "~ambient"}
+    monkeypatch.setattr(held_out, "_misfit", lambda _, model: 0.0 if alike & set(model.units) else 400.0)
+    kinds = {"unit_calibration": "calibration", "~ambient": "form", "remainder:electrical_a": "remainder"}
+    units = {u: Unit(u, kind, ("electrical",), []) for u, kind in kinds.items()}
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
+
+    def less(model, unit):
+        return fit(tuple((c.unit, c.variant) for c in model.choices if c.unit != unit))
+
+    search = SimpleNamespace(fit=fit, less=less, units=units, candidates=[(u, 0) for u in units])
+    alone, both = fit((("~ambient", 0),)), fit((("unit_calibration", 0), ("~ambient", 0)))
+    explored = SimpleNamespace(fit=SimpleNamespace(models=[alone, both], search=search))
+    account = held_out._Account(explored, ["unit_calibration"])
+    assert account.ratio("~ambient") == account.ratio("unit_calibration") == 0.0
+    account.let_go("~ambient", left=True)
+    assert account.ratio("unit_calibration") == 200.0
+    assert account.base.units == ("remainder:electrical_a",)

@@ -12,13 +12,14 @@ from .point import State
 from .signals import SPEED_SPAN, Signals, odd
 
 LEVEL = 4  # of the functions of a remainder: the current's
+TEMPERATURE = 14  # the temperature's
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
 EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
 #: functions of a remainder along one coordinate: speed, current, time and temperature, angle
 ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 12, 13))
 SMOOTH = 3  # functions of the speed that an own form has
-#: functions of an own form along one coordinate: speed, current, time, angle
-OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6), (0, 7, 8, 9, 10, 11, 12, 13, 14))
+#: functions of an own form along one coordinate: speed, current, time and temperature, angle
+OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6, 15), (0, 7, 8, 9, 10, 11, 12, 13, 14))
 #: times that rows are averaged over an interval, where not once: a second difference is a mean of means
 AVERAGED = {"torque": 2, "position": 0}
 SLOW = 8.0  # rad/s, scale of the range of low speeds, where friction changes most
@@ -58,7 +59,7 @@ def functions_of(rec: Signals) -> dict[str, Any]:
 
 def _own(phi: np.ndarray, smooth: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Functions of an own form, (row,) each: views of those of a remainder, and smooth ones of the speed."""
-    return [*phi[:2], *smooth, *phi[LEVEL:14]]
+    return [*phi[:2], *smooth, *phi[LEVEL : TEMPERATURE + 1]]
 
 
 def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) -> dict[str, Any]:

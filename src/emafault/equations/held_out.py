@@ -83,6 +83,7 @@ def held_to_account(
         ratios[remainder] = account.of_remainder(remainder)
         if ratios[remainder] < CLEAR:
             sets.drop(remainder, False)
+            account.let_go(remainder)
     # what is told of effects depends on whether what is described beside them is there, or a remainder in its place
     _ask_forms(sets, account, ratios)
     for told, incomplete in sets.told(ratios, wandering):
@@ -115,7 +116,9 @@ def _ask_forms(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> 
             sets.unexplained |= set(sets.fit.search.units[form].equations)
             leading = sets.leading(form)
             without, instead = (_less(sets.fit.search, leading, form, left) for left in (False, True))
-            sets.drop(form, instead.log_posterior > without.log_posterior and account.instead(form) >= CLEAR)
+            left = instead.log_posterior > without.log_posterior and account.instead(form) >= CLEAR
+            sets.drop(form, left)
+            account.let_go(form, left)
 
 
 class _Sets:
@@ -207,11 +210,35 @@ class _Account:
     def __init__(self, explored: Explored, named: Sequence[str]):
         self.explored, self.search = explored, explored.fit.search
         self.leading = next((m for m in explored.fit.models if set(named) <= set(m.units)), explored.fit.models[0])
-        kinds = {u.id: u.kind for u in self.search.units.values()}
-        self.base = self.search.fit(
-            tuple((c.unit, c.variant) for c in self.leading.choices if kinds.get(c.unit) not in LISTED)
-        )
+        self.gone: set[str] = set()
+        self.instead_of: list[tuple[str, int]] = []  # remainders in the place of what is gone
         self.misfits: dict[tuple, float] = {}
+        self.base = self._of_none_listed()
+
+    def let_go(self, unit: str, left: bool = False) -> None:
+        """A unit that is not told: from here on it stands in for no other; ``left``: a remainder does in its place."""
+        first = self._likeliest(unit)
+        self.gone.add(unit)
+        if left and first is not None:
+            more = [(c.unit, c.variant) for c in _less(self.search, first, unit, True).choices]
+            self.instead_of += [m for m in more if m[0] not in first.units and m not in self.instead_of]
+            self.gone -= {u for u, _ in self.instead_of}
+        self.leading = self._left(self.leading)
+        self.base = self._of_none_listed()
+
+    def _left(self, model: Model) -> Model:
+        """A set less what has been let go, with what takes its place."""
+        if self.gone.isdisjoint(model.units) and {u for u, _ in self.instead_of} <= set(model.units):
+            return model
+        members = [(c.unit, c.variant) for c in model.choices if c.unit not in self.gone]
+        return self.search.fit((*members, *(m for m in self.instead_of if m[0] not in model.units)))
+
+    def _of_none_listed(self) -> Model:
+        """The leading set less its listed effects."""
+        units = self.search.units
+        return self.search.fit(
+            tuple((c.unit, c.variant) for c in self.leading.choices if units[c.unit].kind not in LISTED)
+        )
 
     def ratio(self, unit: str) -> float:
         """Of a set with a unit over the same without it; 0 where the explored recordings never had the unit."""
@@ -240,8 +267,9 @@ class _Account:
         return 0.5 * (nothing - remainder)
 
     def _likeliest(self, unit: str) -> Model | None:
-        """Of the explored recordings' sets with a unit."""
-        return next((m for m in self.explored.fit.models if unit in m.units), None)
+        """Of the explored recordings' sets with a unit, less what has been let go."""
+        found = next((m for m in self.explored.fit.models if unit in m.units), None)
+        return None if found is None else self._left(found)
 
     def _over_less(self, inside: Model, unit: str) -> float:
         return 0.5 * (self._misfit(self.search.less(inside, unit)) - self._misfit(inside))
