@@ -1,11 +1,13 @@
 """The reference actuator as the diagnosis sees it: its priors, and that a fit stands still at its optimum."""
 
 import numpy as np
+import pytest
 
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.linear import disturbance, raw_columns
 from emafault.effects import EFFECTS
 from emafault.equations import commutation
+from emafault.equations.coordinates import OWN_ALONG
 from emafault.equations.point import Point, State
 
 from .conftest import machine_of, recorded
@@ -23,6 +25,19 @@ def test_a_prior_on_one_side_of_off_has_the_whole_range_of_the_catalogue(nominal
                 if sign != 0 and known is not None:
                     side = (known.low - p.off, known.high - p.off)
                     assert min(sign * x for x in side) >= 0.0, p.name
+
+
+def test_the_form_of_an_effect_may_differ_along_every_coordinate(nominal):
+    """Each function of an own form is the constant or goes along one coordinate, the temperature beside time."""
+    name, rec = next(iter(nominal.recordings.items()))
+    block = next(
+        b for b in nominal.blocks({n: p.off for n, p in nominal.parameters.items()}, name) if b.equation == "torque"
+    )
+    own = block.coordinates["own"]
+    assert set().union(*OWN_ALONG) == set(range(len(own)))
+    temperature = next(along for along in OWN_ALONG if len(own) - 1 in along)
+    assert np.ptp(own[-1]) == 0.0 and own[-1][0] == pytest.approx(rec.dT_measured / 50.0)
+    assert np.corrcoef(own[temperature[1]], block.coordinates["time"])[0, 1] == pytest.approx(1.0)
 
 
 def test_a_fit_stands_still_at_its_optimum():

@@ -65,7 +65,8 @@ def held_to_account(
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
     it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong, by
-    itself and in the place of a form that is not told.
+    itself and in the place of a form that is not told. What is not told is left out of the sets that others are
+    compared within from then on: of two causes that explain the same, neither is missed beside the other.
 
     Parameters
     ----------
@@ -211,29 +212,28 @@ class _Account:
         self.explored, self.search = explored, explored.fit.search
         self.leading = next((m for m in explored.fit.models if set(named) <= set(m.units)), explored.fit.models[0])
         self.gone: set[str] = set()
-        self.instead_of: list[tuple[str, int]] = []  # remainders in the place of what is gone
+        self.instead_of: dict[str, int] = {}  # remainders in the place of what is gone, and their variants
         self.misfits: dict[tuple, float] = {}
-        self.base = self._of_none_listed()
 
     def let_go(self, unit: str, left: bool = False) -> None:
         """A unit that is not told: from here on it stands in for no other; ``left``: a remainder does in its place."""
         first = self._likeliest(unit)
         self.gone.add(unit)
         if left and first is not None:
-            more = [(c.unit, c.variant) for c in _less(self.search, first, unit, True).choices]
-            self.instead_of += [m for m in more if m[0] not in first.units and m not in self.instead_of]
-            self.gone -= {u for u, _ in self.instead_of}
+            instead = _less(self.search, first, unit, True)
+            self.instead_of |= {c.unit: c.variant for c in instead.choices if c.unit not in first.units}
+            self.gone -= set(self.instead_of)
         self.leading = self._left(self.leading)
-        self.base = self._of_none_listed()
 
     def _left(self, model: Model) -> Model:
         """A set less what has been let go, with what takes its place."""
-        if self.gone.isdisjoint(model.units) and {u for u, _ in self.instead_of} <= set(model.units):
+        if self.gone.isdisjoint(model.units) and set(self.instead_of) <= set(model.units):
             return model
-        members = [(c.unit, c.variant) for c in model.choices if c.unit not in self.gone]
-        return self.search.fit((*members, *(m for m in self.instead_of if m[0] not in model.units)))
+        members = self.instead_of | {c.unit: c.variant for c in model.choices if c.unit not in self.gone}
+        return self.search.fit(tuple(members.items()))
 
-    def _of_none_listed(self) -> Model:
+    @property
+    def base(self) -> Model:
         """The leading set less its listed effects."""
         units = self.search.units
         return self.search.fit(
