@@ -34,11 +34,15 @@ def residual(state: State) -> Dual:
     # a demand is in force for one control period from the instant its inputs are sampled
     lead = 0.5 * a.control_period
     # what the controller saw is recorded with noise that a small gain would take out of the demand: the angle's rate
-    # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged
+    # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged, over
+    # a span that takes out the noise and leaves the sensor's own dynamics
     shaft = position.shaft_angle(state)
     output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
-    beyond = (rec.speed_recorded - model).linear(lambda x: _averaged(x, h), rec.size)
+    span = _speed_span(state)
+    beyond = (_calmed(rec.speed_recorded, h) - model).linear(
+        lambda x: uniform_filter1d(x, span, mode="nearest"), rec.size
+    )
     # rounding is the recording's alone, and no more than a step
     more = np.maximum(np.abs(beyond.value) - rec.speed_step, 0.0)
     seen = model + Dual(np.sign(beyond.value) * more, beyond.kept(more > 0.0).slopes)
@@ -77,6 +81,29 @@ def _calmed(x: np.ndarray, h: float) -> np.ndarray:
 
 def _averaged(x: np.ndarray, h: float) -> np.ndarray:
     return uniform_filter1d(x, odd(AVERAGED / h), mode="nearest")
+
+
+def _speed_span(state: State) -> int:
+    """Samples that the speed is averaged over, as the undisturbed recording without any effect has it: of spans up to
+    ``AVERAGED``, the one with the least unbiased estimate of the squared error (Stein 1981, Annals of Statistics 9, 6).
+    """
+    rec = state.rec
+    return rec.drawn_from.once(("control.speed_span",), lambda: _least_risk(rec))
+
+
+def _least_risk(rec) -> int:
+    h, calm, longest = rec.interval, odd(SPEED_SPAN / rec.interval), odd(AVERAGED / rec.interval)
+    beyond = _calmed(rec.speed_recorded - rec.rate, h)
+    impulse = np.zeros(4 * (longest + calm) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    noise = [rec.noise.speed * impulse, rec.noise.angle / h * np.diff(impulse, prepend=0.0)]
+    noise = [uniform_filter1d(x, calm) for x in noise]
+    risk = {}
+    for span in sorted({odd(longest / 2**k) for k in range(longest.bit_length())}):
+        left = beyond - uniform_filter1d(beyond, span, mode="nearest")
+        kept = sum(float(x @ uniform_filter1d(x, span)) for x in noise)
+        risk[span] = float(np.mean(left**2)) + 2.0 * kept
+    return min(risk, key=lambda span: risk[span])
 
 
 def _true_level(state: State) -> Dual:
@@ -234,10 +261,11 @@ def _usable(rec, sign: np.ndarray) -> np.ndarray:
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (A2): of the current, and of what the controller saw, through its law."""
     rec = state.rec
-    return rec.once(("control.noise_bands",), lambda: _noise_bands(rec, np.sign(state.drive)))
+    return rec.once(("control.noise_bands",), lambda: _noise_bands(state, np.sign(state.drive)))
 
 
-def _noise_bands(rec, sign: np.ndarray) -> list[np.ndarray]:
+def _noise_bands(state: State, sign: np.ndarray) -> list[np.ndarray]:
+    rec = state.rec
     a, s = rec.actuator, rec.noise
     h, width = rec.interval, block_length(rec)
     count = rec.size // width - 1
@@ -247,18 +275,17 @@ def _noise_bands(rec, sign: np.ndarray) -> list[np.ndarray]:
     white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2
     white = white + _means(_lacking(rec, sign), width) ** 2
     bands: list[np.ndarray | float] = [white[1:] + white[:-1], -white[1:-1]]
-    averaged, calm = odd(AVERAGED / h), odd(SPEED_SPAN / h)
+    averaged, calm, span = odd(AVERAGED / h), odd(SPEED_SPAN / h), _speed_span(state)
     size = 2 * (averaged + calm) + 8 * width
     impulse = np.zeros(size)
     impulse[(averaged + calm) // 2 + width] = 1.0
     position = a.gear_ratio * a.position_gain
     rate = uniform_filter1d(np.diff(impulse, prepend=0.0) / h, calm)
-    angle = a.position_gain * impulse + rate
     slow = uniform_filter1d(impulse, averaged)
     for source, sigma in (
         (position * slow, s.position),
-        (slow, s.speed),
-        (angle - uniform_filter1d(angle, averaged), s.angle),
+        (uniform_filter1d(uniform_filter1d(impulse, calm), span), s.speed),
+        (a.position_gain * (impulse - slow) + rate - uniform_filter1d(rate, span), s.angle),
     ):
         demand = a.speed_gain * source + a.speed_integral_gain * h * np.cumsum(source)
         blocked = uniform_filter1d(demand, width, mode="nearest")

@@ -80,6 +80,7 @@ def held_to_account(
     sets, account = _Sets(bench, fit), _Account(explored, named)
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
+    account.let_go_absent(sets.models)
     for remainder in sets.untold(ratios, "remainder", PRESENT):
         ratios[remainder] = account.of_remainder(remainder)
         if ratios[remainder] < CLEAR:
@@ -225,6 +226,13 @@ class _Account:
             self.gone -= set(self.instead_of)
         self.leading = self._left(self.leading)
 
+    def let_go_absent(self, models: Sequence[Model]) -> None:
+        """Forms and remainders that the sets of all recordings say are more likely not there."""
+        units, present = self.search.units, {u for u, p in inclusion(models).items() if p >= PRESENT}
+        for unit in self.leading.units:
+            if units[unit].kind not in LISTED and unit not in present:
+                self.let_go(unit, any(f"remainder:{e}" in present for e in units[unit].equations))
+
     def _left(self, model: Model) -> Model:
         """A set less what has been let go, with what takes its place."""
         if self.gone.isdisjoint(model.units) and set(self.instead_of) <= set(model.units):
@@ -242,6 +250,7 @@ class _Account:
 
     def ratio(self, unit: str) -> float:
         """Of a set with a unit over the same without it; 0 where the explored recordings never had the unit."""
+        self.gone.discard(unit)
         inside = self.leading
         if unit not in inside.units or self._misfit(self.leading) > self._misfit(self.base) + 2.0 * CLEAR:
             first = self._likeliest(unit)
@@ -254,6 +263,7 @@ class _Account:
 
     def of_remainder(self, unit: str) -> float:
         """Of the likeliest set with a remainder over the same without it; 0 where the explored recordings had none."""
+        self.gone.discard(unit)
         first = self._likeliest(unit)
         return 0.0 if first is None else self._over_less(first, unit)
 
