@@ -9,7 +9,7 @@ import pytest
 from emafault.diagnosis.evidence import Reduced
 from emafault.diagnosis.linear import White
 from emafault.diagnosis.model import Parameter, Unit, Variant
-from emafault.diagnosis.naming import read
+from emafault.diagnosis.naming import possible_place, read
 from emafault.diagnosis.search import Candidate, Choice, Model, Search
 from emafault.equations import held_out
 
@@ -57,6 +57,17 @@ def test_a_form_that_is_there_or_left_as_a_remainder_of_its_equation_is_told(res
     assert found.forms == (("~drift_speed",) if told else ())
     assert 0.7 < found.inclusion["~drift_speed"] < 0.8
     assert read([model(0.0, "~drift_speed"), model(1.0, rest)], units).forms == ()
+
+
+def test_where_a_form_or_an_effect_is_sure_but_not_which_something_is_unknown_there():
+    units = [unit("gain", "electrical"), unit("~function", "electrical_a", kind="form")]
+    either = read([model(0.0, "~function"), model(-1.0, "gain"), model(-30.0)], units)
+    assert (either.verdict, either.named, either.forms, possible_place(either)) == ("unknown", (), (), "electrical_a")
+    assert either.empty < 1e-9 and 0.7 < either.unknown < 0.8
+    neither = read([model(0.0), model(-2.0, "~function")], units)
+    assert neither.verdict == "no_gap" and 0.8 < neither.empty < 0.9
+    of_controller = [unit("~controller_filter", "control", kind="form")]
+    assert read([model(0.0, "~controller_filter"), model(-0.5)], of_controller).verdict == "no_gap"
 
 
 def log_evidence(tolerances, *hole):

@@ -104,3 +104,26 @@ def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     account.let_go("~ambient", left=True)
     assert account.ratio("unit_calibration") == 200.0
     assert account.base.units == ("remainder:electrical_a",)
+
+
+def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
+    """Two forms that make up for each other: without one that is not told, the other predicts worse than nothing."""
+    units = {u: Unit(u, "form", ("torque",), []) for u in ("~frequency", "~function")}
+    misfits = {(): 400.0, ("~frequency",): 700.0, ("~function",): 900.0, ("~frequency", "~function"): 100.0}
+    monkeypatch.setattr(held_out, "_misfit", lambda _, model: misfits[model.units])
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
+
+    def less(model, unit):
+        return fit(tuple((c.unit, c.variant) for c in model.choices if c.unit != unit))
+
+    search = SimpleNamespace(fit=fit, less=less, units=units, candidates=[(u, 0) for u in units])
+    both, one = fit((("~frequency", 0), ("~function", 0))), fit((("~function", 0),))
+    explored = SimpleNamespace(fit=SimpleNamespace(models=[both], search=search))
+    for models, ratio in (([both], 300.0), ([one], -250.0)):
+        account = held_out._Account(explored, [])
+        account.let_go_absent(models)
+        assert account.ratio("~function") == ratio
+    account.let_go_absent([one])
+    assert account.ratio("~frequency") == 400.0  # asked after all, it is there again

@@ -114,6 +114,15 @@ def test_the_control_law_holds_where_a_step_is_braked(theta_0):
     assert abs(block.residual[block.usable].sum()) < 0.015
 
 
+@pytest.mark.parametrize("command", ["reversal", "sine"])
+def test_the_controller_saw_the_recorded_speed_whatever_dynamics_it_has(command):
+    recording = recorded(command, effects={"speed_latency": {"tau": 2e-3}})
+    machine = machine_of({"a.nc": recording})
+    found = mean_squares(machine, truth(machine, recording))
+    assert found["sensor_speed"] > 50.0
+    assert found["control"] < 1.3
+
+
 def test_a_lag_of_the_speed_is_where_it_fits_best():
     """A longer one smooths the noise of the angle that the speed is compared with, which tells nothing of the lag."""
     true = {"speed_latency": {"tau": 1e-5}}

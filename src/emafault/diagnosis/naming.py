@@ -10,6 +10,7 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from scipy.special import expit
 
 from .model import LISTED, SETTINGS, Unit
@@ -21,7 +22,7 @@ PRESENT = 0.5  # of a remainder, from which it is more likely there than not
 OWN_BUSINESS = ("remainder:control", "remainder:commutation")
 MEMBERS = 4  # largest group
 MOST = 12  # sets told
-POSSIBLE = 0.1  # inclusion of a remainder, from which what is unknown is said to lie in its equation
+POSSIBLE = 0.1  # inclusion of what is undescribed, from which what is unknown is said to lie in its equation
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,9 @@ class Reading:
     remainders: tuple[str, ...]
     inclusion: Mapping[str, float]
     sets: Sequence[tuple[tuple[str, ...], float, Model]]  # listed effects of a set, its mass, its leading model
-    empty: float  # mass of sets without listed effect and remainder
-    unknown: float  # mass of sets without listed effect, with a remainder
+    empty: float  # mass of sets without listed effect, and with nothing else that is not told
+    unknown: float  # mass of sets without listed effect, with a remainder or a form that is not told
+    places: Mapping[str, float]  # by equation, the largest inclusion of a remainder or of a form that is not told
     verdict: str
 
     @property
@@ -60,35 +62,15 @@ def read(
     """
     units = list(units)
     kind = {**{f"remainder:{e}": "remainder" for e in wandering}, **{u.id: u.kind for u in units}}
-    weights = posterior(models)
-    inclusion: dict[str, float] = {e: 1.0 for e in observed}
-    masses: dict[tuple[str, ...], float] = {}
-    leading: dict[tuple[str, ...], Model] = {}
-    empty = unknown = settings = 0.0
+    weights = [float(w) for w in posterior(models)]
     acts = {u.id: u.equations for u in units}
     wanders = {e: float(expit(odds)) for e, odds in wandering.items()}
-    for model, w in zip(models, weights, strict=True):
-        listed = tuple(sorted({*observed, *(u for u in model.units if kind.get(u) in LISTED)}))
-        for u in model.units:
-            inclusion[u] = inclusion.get(u, 0.0) + float(w)
-        # what wanders beside a listed effect may be that one's own form
-        steady = 1.0
-        for e, p in wanders.items():
-            left = f"remainder:{e}"
-            if left not in model.units and not any(meet(acts.get(u, ()), (e,)) for u in listed):
-                inclusion[left] = inclusion.get(left, 0.0) + float(w) * p
-                steady *= 1.0 - p
-        left_over = any(kind.get(u, "remainder") == "remainder" and u not in OWN_BUSINESS for u in model.units)
-        if listed:
-            masses[listed] = masses.get(listed, 0.0) + float(w)
-            leading.setdefault(listed, model)
-            if not left_over and all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed):
-                settings += float(w) * steady
-        elif left_over:
-            unknown += float(w)
-        else:
-            empty += float(w) * steady
-            unknown += float(w) * (1.0 - steady)
+    listed_of = [tuple(sorted({*observed, *(u for u in m.units if kind.get(u) in LISTED)})) for m in models]
+    wandering_of = [_wandering(m, listed, acts, wanders) for m, listed in zip(models, listed_of, strict=True)]
+    inclusion: dict[str, float] = {e: 1.0 for e in observed}
+    for model, w, may in zip(models, weights, wandering_of, strict=True):
+        for u, p in {**dict.fromkeys(model.units, 1.0), **may}.items():
+            inclusion[u] = inclusion.get(u, 0.0) + w * p
     inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
@@ -96,9 +78,26 @@ def read(
     present = [e for e, p in inclusion.items() if p >= PRESENT and kind.get(e) == "form"]
     forms = tuple(sorted(e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
+    of_controller = {u.id for u in units if u.of_controller}
+    # a form that is not told is no explanation, and no sign that there is nothing
+    undescribed = {u.id for u in units if u.kind == "form"} - {*forms, *of_controller}
+    left = [any(u in undescribed or _is_left(u, kind) for u in m.units) for m in models]
+    steady = [float(np.prod([1.0 - p for p in may.values()])) for may in wandering_of]
+    masses: dict[tuple[str, ...], float] = {}
+    leading: dict[tuple[str, ...], Model] = {}
+    empty = unknown = settings = 0.0
+    for model, w, listed, sure in zip(models, weights, listed_of, np.where(left, 0.0, steady), strict=True):
+        if listed:
+            masses[listed] = masses.get(listed, 0.0) + w
+            leading.setdefault(listed, model)
+            if all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed):
+                settings += w * float(sure)
+        else:
+            empty += w * float(sure)
+            unknown += w * float(1.0 - sure)
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
     nothing = max(0.0, empty + settings)  # what is the controller's alone is no gap of the machine
-    of_machine = set(forms) - {u.id for u in units if u.of_controller}
+    of_machine = set(forms) - of_controller
     beside = counted or of_machine or [r for r in remainders if r not in OWN_BUSINESS]
     if named and not groups:
         verdict = "partly" if beside else "explained"
@@ -110,7 +109,26 @@ def read(
         verdict = "no_gap"
     else:
         verdict = "unknown"
-    return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, verdict)
+    places: dict[str, float] = {}
+    for u, p in inclusion.items():
+        if u in undescribed or u.startswith("remainder:"):
+            place = acts[u][0] if u in undescribed else u.split(":", 1)[1]
+            places[place] = max(p, places.get(place, 0.0))
+    return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, places, verdict)
+
+
+def _is_left(unit: str, kind: Mapping[str, str]) -> bool:
+    """Whether a unit is a remainder that is not the controller's own business."""
+    return kind.get(unit, "remainder") == "remainder" and unit not in OWN_BUSINESS
+
+
+def _wandering(
+    model: Model, listed: Sequence[str], acts: Mapping[str, Sequence[str]], wanders: Mapping[str, float]
+) -> dict[str, float]:
+    """Remainders that a set does not have, with the probabilities that what it leaves wanders so; beside a listed
+    effect that may be the effect's own form."""
+    free = [e for e in wanders if not any(meet(acts.get(u, ()), (e,)) for u in listed)]
+    return {f"remainder:{e}": wanders[e] for e in free if f"remainder:{e}" not in model.units}
 
 
 def _or_left(models: Sequence[Model], weights: Iterable[float], form: str, equations: Sequence[str]) -> float:
@@ -187,10 +205,7 @@ def told_sets(
     return [*entries, empty, unknown]
 
 
-def possible_remainder(reading: Reading) -> str | None:
-    """Equation of the likeliest remainder, if it is possible at all."""
-    left = [k for k in reading.inclusion if k.startswith("remainder:")]
-    likeliest = min(left, key=lambda k: (-reading.inclusion[k], k), default=None)
-    if likeliest is None or reading.inclusion[likeliest] <= POSSIBLE:
-        return None
-    return likeliest.split(":", 1)[1]
+def possible_place(reading: Reading) -> str | None:
+    """Equation where something undescribed is the likeliest, if it is possible at all."""
+    likeliest = min(reading.places, key=lambda e: (-reading.places[e], e), default=None)
+    return None if likeliest is None or reading.places[likeliest] <= POSSIBLE else likeliest

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
-from ..diagnosis.naming import Reading, possible_remainder, told_sets
+from ..diagnosis.naming import Reading, possible_place, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model, Search
 from ..diagnosis.where import where
@@ -158,7 +158,7 @@ def _reported(bench: Bench, effect: str, model: Model) -> dict[str, tuple[float,
 
 def _which(fitted: Fitted, found: Sequence[Mapping]) -> list[dict[str, Any]]:
     """Sets with their probabilities and parameters, see ``told_sets``."""
-    left = possible_remainder(fitted.reading)
+    left = possible_place(fitted.reading)
     equation = EQUATION.get(left, left) if left else str(found[0]["equation"]) if found else "electrical"
     return told_sets(
         fitted.reading, fitted.fit.search,

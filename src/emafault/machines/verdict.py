@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..diagnosis.naming import possible_remainder, told_sets
+from ..diagnosis.naming import possible_place, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Model
 from ..diagnosis.where import where
@@ -73,7 +73,7 @@ def _which(machine: Machine, fitted: "Fitted", found: Sequence[Mapping]) -> list
 
 def _equation(fitted: "Fitted", found: Sequence[Mapping]) -> str:
     """Where what is unknown lies: the remainder's equation, else that with the largest residual."""
-    left = possible_remainder(fitted.reading)
+    left = possible_place(fitted.reading)
     if left is not None:
         return told(left)
     if found:
