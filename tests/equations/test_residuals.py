@@ -123,6 +123,19 @@ def test_the_controller_saw_the_recorded_speed_whatever_dynamics_it_has(command)
     assert found["control"] < 1.3
 
 
+def test_what_a_point_takes_off_the_angle_leaves_the_noise_as_it_is():
+    """An error that is allowed to be larger or smaller would have a likelihood of its own, whatever it is."""
+    recording = recorded("reversal", effects={"speed_latency": {"tau": 3e-4}})
+    machine = machine_of({"a.nc": recording})
+    before, after = (
+        next(b for b in machine.blocks(truth(machine, recording) | lag, "a.nc", wanted=()) if b.equation == "control")
+        for lag in ({}, {"lag.angle_late": 0.3})
+    )
+    assert np.max(np.abs(after.residual - before.residual)) > 0.0
+    assert len(after.bands) == len(before.bands)
+    assert np.allclose(before.bands[0], after.bands[0], rtol=0.03)
+
+
 def test_a_lag_of_the_speed_is_where_it_fits_best():
     """A longer one smooths the noise of the angle that the speed is compared with, which tells nothing of the lag."""
     true = {"speed_latency": {"tau": 1e-5}}

@@ -84,11 +84,13 @@ def _averaged(x: np.ndarray, h: float) -> np.ndarray:
 
 
 def _speed_span(state: State) -> int:
-    """Samples that the speed is averaged over, as the undisturbed recording without any effect has it: of spans up to
-    ``AVERAGED``, the one with the least unbiased estimate of the squared error (Stein 1981, Annals of Statistics 9, 6).
+    """Samples that the speed is averaged over, of the recording as it is, whatever the point takes off it.
+
+    Of spans up to ``AVERAGED`` it is that with the least unbiased estimate of the squared error (Stein 1981, Annals of
+    Statistics 9, 1135).
     """
     rec = state.rec
-    return rec.drawn_from.once(("control.speed_span",), lambda: _least_risk(rec))
+    return rec.rows_from.once(("control.speed_span",), lambda: _least_risk(rec.rows_from))
 
 
 def _least_risk(rec) -> int:
