@@ -1,6 +1,6 @@
 """How the page says what remains."""
 
-from emafault.equations.sentences import _remainders
+from emafault.equations.sentences import _remainders, finding
 
 NOISE = " more than noise, not described further."
 
@@ -25,3 +25,17 @@ def test_phases_that_differ_keep_their_own_sentences():
         f"The electrical equation of phase a leaves{NOISE}",
         f"The electrical equation of phase b leaves{other}",
     ]
+
+
+def test_what_is_unknown_is_placed_and_what_may_be_it_is_said():
+    verdict = {
+        "verdict": "unknown", "discovered": [], "groups": [], "controller": {}, "shrinks": {"signal": None},
+        "which": [{"effects": ["unknown"], "equation": "electrical_a", "probability": 0.772}],
+        "inclusion": {"contact_resistance": 0.08, "voltage_gain": 0.139, "remainder:electrical_a": 0.4},
+    }  # fmt: skip
+    assert finding(verdict) == [
+        "Recordings and model differ in the electrical equation of phase a; no listed effect reaches a probability of "
+        "0.9 (voltage gain 0.14, none of them 0.77)."
+    ]
+    verdict["inclusion"] = {}
+    assert finding(verdict)[0].endswith("of 0.9 (none of them 0.77).")

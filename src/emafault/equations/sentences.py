@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..diagnosis.naming import NAMED, POSSIBLE
 from .electrical import NAMES
 from .telling import differing_gains
 from .terms import TERMS
@@ -26,9 +27,11 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"(posterior probability {p:.3g})."
         )
     if kind == "unknown":
+        possible = sorted((-p, e) for e, p in verdict["inclusion"].items() if p >= POSSIBLE and e in TERMS)
+        likely = "".join(f"{e.replace('_', ' ')} {-p:.2g}, " for p, e in possible)
         out.append(
-            f"Recordings and model differ in the {str(first['equation']).replace('_', ' ')} equation; no listed effect "
-            f"reaches a probability of 0.9 (probability that none is the cause {first['probability']:.2g})."
+            f"Recordings and model differ in the {_equation(str(first['equation']))}; no listed effect reaches a "
+            f"probability of {NAMED} ({likely}none of them {first['probability']:.2g})."
         )
     out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
     for name, g in differing_gains(verdict).items():
@@ -61,6 +64,11 @@ def _remainders(found: Sequence[Mapping[str, Any]]) -> list[str]:
         for what, p in phases.items()
     ]
     return [*said, *rest]
+
+
+def _equation(name: str) -> str:
+    """An equation in words."""
+    return f"electrical equation of phase {name[-1]}" if name in NAMES else f"{name.replace('_', ' ')} equation"
 
 
 def _listed(words: list[str]) -> str:
