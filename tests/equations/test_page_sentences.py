@@ -30,7 +30,11 @@ def test_phases_that_differ_keep_their_own_sentences():
 def test_what_is_unknown_is_placed_and_what_may_be_it_is_said():
     verdict = {
         "verdict": "unknown", "discovered": [], "groups": [], "controller": {}, "shrinks": {"signal": None},
-        "which": [{"effects": ["unknown"], "equation": "electrical_a", "probability": 0.772}],
+        "which": [
+            {"effects": ["unknown"], "equation": "electrical_a", "probability": 0.672},
+            {"effects": ["voltage_gain"], "probability": 0.139},
+            {"effects": [], "probability": 0.1},
+        ],
         "inclusion": {"contact_resistance": 0.08, "voltage_gain": 0.139, "remainder:electrical_a": 0.4},
     }  # fmt: skip
     assert finding(verdict) == [

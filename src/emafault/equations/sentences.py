@@ -28,10 +28,11 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
         )
     if kind == "unknown":
         possible = sorted((-p, e) for e, p in verdict["inclusion"].items() if p >= POSSIBLE and e in TERMS)
+        none = sum(w["probability"] for w in verdict["which"] if w["effects"] in ([], ["unknown"]))
         likely = "".join(f"{e.replace('_', ' ')} {-p:.2g}, " for p, e in possible)
         out.append(
             f"Recordings and model differ in the {_equation(str(first['equation']))}; no listed effect reaches a "
-            f"probability of {NAMED} ({likely}none of them {first['probability']:.2g})."
+            f"probability of {NAMED} ({likely}none of them {none:.2g})."
         )
     out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
     for name, g in differing_gains(verdict).items():
