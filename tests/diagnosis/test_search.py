@@ -51,3 +51,28 @@ def test_what_needs_three_forms_of_a_scan_is_a_remainder(proposed):
     search = Search(reduced, units, {(n, 0): _candidate([k], 1.0, [n]) for k, n in enumerate(names)})
     assert np.isfinite(search.log_prior([(n, 0) for n in names[:2]]))
     assert np.isfinite(search.log_prior([(n, 0) for n in names])) == (not proposed)
+
+
+def test_what_an_own_form_takes_up_of_another_cause_is_given_back():
+    """An effect in another form explains at one step what it and a wave do, and nothing is promised by the wave then."""
+    rng = np.random.default_rng(2)
+    causes = ["wave", *(f"cause_{k}" for k in range(CAUSES)), "effect"]
+    X = rng.standard_normal((ROWS, len(causes)))
+    own = np.column_stack([X[:, 0], rng.standard_normal((ROWS, 2))])
+    r = -(X[:, -1] + 0.9 * X[:, 0]) + rng.standard_normal(ROWS)
+    columns, shapes = np.column_stack([X, own]), [f"own.effect.torque.{k}" for k in range(3)]
+    names = [*causes, *shapes]
+    normal = Normal(names, columns.T @ columns, columns.T @ r, float(r @ r))
+    reduced = marginalise(normal, [], np.zeros(0), np.zeros(0), np.zeros(len(names)))
+    units = [Unit(c, "structural", ("torque",), [Variant([Parameter(c, 0.0, 0.0, 1.0)])]) for c in causes]
+    candidates = {(c, 0): _candidate([reduced.index[c]], 1.0, [c]) for c in causes}
+    form = _candidate([reduced.index["effect"]], 1.0, ["effect"])
+    form.extra, form.extra_sd = np.array([reduced.index[n] for n in shapes]), np.full(3, 0.17)
+    candidates["effect", 10] = form
+    search = Search(reduced, units, candidates)
+
+    best = search.run()[0]
+    assert {(c.unit, c.variant) for c in best.choices} == {("effect", 0), ("wave", 0)}
+    alone = search.fit((("effect", 10),))
+    assert 3.0 < best.log_posterior - alone.log_posterior < 30.0
+    assert best.log_posterior - search.fit((("effect", 0),)).log_posterior > 100.0

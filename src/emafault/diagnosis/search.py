@@ -244,13 +244,22 @@ class Search:
         # a remainder stands in for several causes at once, from which no single step leads back to them
         self._climb(rounds, {m for m in self.candidates if self.units[m[0]].kind != "remainder"})
         self._climb(rounds, set(self.candidates))
-        for model in self.ranked()[:COMPLETED]:  # what is too small to be seen has its prior odds, and is not left out
+        # a unit in another form may take up what is another's, beside which its own form is the better again
+        while self._complete():
+            self._climb(rounds, set(self.candidates))
+        return self.ranked()
+
+    def _complete(self) -> bool:
+        """Add every candidate to the leading sets, for what is too small to be seen has its prior odds and is not left
+        out; whether another set leads then."""
+        before = self.ranked()
+        for model in before[:COMPLETED]:
             inside = tuple((c.unit, c.variant) for c in model.choices)
             widths = {(c.unit, c.variant): c.width for c in model.choices}
             for m in self.candidates:
                 if m[0] not in {u for u, _ in inside} and np.isfinite(self.log_prior((*inside, m))):
                     self.fit((*inside, m), widths)
-        return self.ranked()
+        return self.ranked()[0] is not before[0]
 
     def _climb(self, rounds: int, among: set[tuple[str, int]]) -> None:
         """Extend the likeliest sets by some of the candidates until none is left that is worth it."""
