@@ -54,7 +54,7 @@ def test_what_needs_three_forms_of_a_scan_is_a_remainder(proposed):
 
 
 def test_what_an_own_form_takes_up_of_another_cause_is_given_back():
-    """An effect in another form explains at one step what it and a wave do, and nothing is promised by the wave then."""
+    """An effect in another form explains at one step what it and a wave do, and the wave promises nothing then."""
     rng = np.random.default_rng(2)
     causes = ["wave", *(f"cause_{k}" for k in range(CAUSES)), "effect"]
     X = rng.standard_normal((ROWS, len(causes)))
