@@ -22,7 +22,7 @@ PRESENT = 0.5  # of a remainder, from which it is more likely there than not
 OWN_BUSINESS = ("remainder:control", "remainder:commutation")
 MEMBERS = 4  # largest group
 MOST = 12  # sets told
-POSSIBLE = 0.1  # inclusion of what is undescribed, from which what is unknown is said to lie in its equation
+POSSIBLE = 0.1  # inclusion from which a listed effect, or something undescribed, is told as possible
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Reading:
     remainders: tuple[str, ...]
     inclusion: Mapping[str, float]
     sets: Sequence[tuple[tuple[str, ...], float, Model]]  # listed effects of a set, its mass, its leading model
-    empty: float  # mass of sets without listed effect, and with nothing else that is not told
-    unknown: float  # mass of sets without listed effect, with a remainder or a form that is not told
+    empty: float  # mass of sets without listed effect that leave nothing undescribed
+    unknown: float  # mass of the other sets without listed effect: with a remainder, or a form that is not told
     places: Mapping[str, float]  # by equation, the largest inclusion of a remainder or of a form that is not told
     verdict: str
 
@@ -109,12 +109,18 @@ def read(
         verdict = "no_gap"
     else:
         verdict = "unknown"
-    places: dict[str, float] = {}
-    for u, p in inclusion.items():
-        if u in undescribed or u.startswith("remainder:"):
-            place = acts[u][0] if u in undescribed else u.split(":", 1)[1]
-            places[place] = max(p, places.get(place, 0.0))
+    places = _places(inclusion, {u: acts[u][0] for u in undescribed})
     return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, places, verdict)
+
+
+def _places(inclusion: Mapping[str, float], undescribed: Mapping[str, str]) -> dict[str, float]:
+    """By equation, the largest inclusion of a remainder or, in its first equation, of a form that is not told."""
+    out: dict[str, float] = {}
+    for u, p in inclusion.items():
+        place = u.removeprefix("remainder:") if u.startswith("remainder:") else undescribed.get(u)
+        if place is not None:
+            out[place] = max(p, out.get(place, 0.0))
+    return out
 
 
 def _is_left(unit: str, kind: Mapping[str, str]) -> bool:

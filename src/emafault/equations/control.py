@@ -94,6 +94,8 @@ def _speed_span(state: State) -> int:
 
 
 def _least_risk(rec) -> int:
+    """The span (samples) with the least risk: the mean square of what the average takes away, plus twice the noise's
+    covariance with its own average."""
     h, calm, longest = rec.interval, odd(SPEED_SPAN / rec.interval), odd(AVERAGED / rec.interval)
     beyond = _calmed(rec.speed_recorded - rec.rate, h)
     impulse = np.zeros(4 * (longest + calm) + 1)
@@ -263,10 +265,10 @@ def _usable(rec, sign: np.ndarray) -> np.ndarray:
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (A2): of the current, and of what the controller saw, through its law."""
     rec = state.rec
-    return rec.once(("control.noise_bands",), lambda: _noise_bands(state, np.sign(state.drive)))
+    return rec.once(("control.noise_bands",), lambda: _noise_bands(state))
 
 
-def _noise_bands(state: State, sign: np.ndarray) -> list[np.ndarray]:
+def _noise_bands(state: State) -> list[np.ndarray]:
     rec = state.rec
     a, s = rec.actuator, rec.noise
     h, width = rec.interval, block_length(rec)
@@ -275,7 +277,7 @@ def _noise_bands(state: State, sign: np.ndarray) -> list[np.ndarray]:
     change = np.abs(np.diff(level, append=level[-1:])) / width
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     white = (s.current**2 + (UNRESOLVED * change) ** 2) / width + (RIPPLE * a.hysteresis) ** 2
-    white = white + _means(_lacking(rec, sign), width) ** 2
+    white = white + _means(_lacking(rec, np.sign(state.drive)), width) ** 2
     bands: list[np.ndarray | float] = [white[1:] + white[:-1], -white[1:-1]]
     averaged, calm, span = odd(AVERAGED / h), odd(SPEED_SPAN / h), _speed_span(state)
     size = 2 * (averaged + calm) + 8 * width

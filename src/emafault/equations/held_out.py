@@ -66,7 +66,8 @@ def held_to_account(
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
     it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong, by
     itself and in the place of a form that is not told. What is not told is left out of the sets that others are
-    compared within from then on: of two causes that explain the same, neither is missed beside the other.
+    compared within from then on: of two causes that explain the same, neither is missed beside the other. So is, from
+    the start, what the sets of all recordings hold to be more likely not there.
 
     Parameters
     ----------
