@@ -103,16 +103,22 @@ def log_evidence(
     log evidence, posterior mean (free,) and standard deviation (free,) of the deviations
     """
     mean, sd = np.asarray(mean, float), np.asarray(sd, float)
-    value, found, deviation = _evidence(r.M, r.b, r.constant, r.fixed, free, mean, sd)
+    value, found, deviation, _, _ = factored_set(r.M, r.b, r.constant, r.fixed, free, mean, sd)
     if not np.isfinite(value):  # what is left of columns of mere noise may have no definite sign
         return -np.inf, mean, sd
     if signs is not None:
-        one = signs != 0
-        if np.any(one):
-            # a prior on one side of off is twice as dense there: the posterior's mass on that side counts
-            where = found[one] - r.fixed[free[one]]
-            value += float(np.sum(np.log(2.0) + log_ndtr(signs[one] * where / deviation[one])))
+        value += sided(r, free, signs, found, deviation)
     return float(value), found, deviation
+
+
+def sided(r: Reduced, free: np.ndarray, signs: np.ndarray, found: np.ndarray, deviation: np.ndarray) -> float:
+    """What priors on one side of off, or on both (``signs`` 0), add to the log evidence of a fit: they are twice as
+    dense there, and the posterior's mass on that side counts."""
+    one = signs != 0
+    if not np.any(one):
+        return 0.0
+    where = found[one] - r.fixed[free[one]]
+    return float(np.sum(np.log(2.0) + log_ndtr(signs[one] * where / deviation[one])))
 
 
 @compiled
@@ -162,8 +168,10 @@ def factored(A):
 
 
 @compiled
-def _evidence(M, b, constant, fixed, free, mean, sd):
-    """Log evidence, posterior mean and standard deviation: ``log_evidence`` without sides."""
+def factored_set(M, b, constant, fixed, free, mean, sd):
+    """Log evidence, posterior mean and standard deviation, as ``log_evidence`` without sides; the Cholesky factor L of
+    the posterior's precision in units of the priors, with its transpose above the diagonal, and L^-1 of the gradient at
+    the priors' means."""
     n = len(free)
     found, deviation = mean.copy(), sd.copy()
     base = fixed.copy()
@@ -186,7 +194,10 @@ def _evidence(M, b, constant, fixed, free, mean, sd):
             A[k, m] = M[row, free[m]] * sd[k] * sd[m]
         A[k, k] += 1.0
     if not factored(A):
-        return -np.inf, found, deviation
+        return -np.inf, found, deviation, A, z
+    for k in range(n):
+        for m in range(k):
+            A[m, k] = A[k, m]
     for k in range(n):  # z = L^-1 of the gradient
         x = z[k]
         for q in range(k):
@@ -209,4 +220,4 @@ def _evidence(M, b, constant, fixed, free, mean, sd):
             power += inverse[k, m] * inverse[k, m]
         found[m] = mean[m] + sd[m] * step
         deviation[m] = np.sqrt(power) * sd[m]
-    return constant, found, deviation
+    return constant, found, deviation, A, z

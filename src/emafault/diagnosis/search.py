@@ -9,6 +9,7 @@ from scipy.special import gammaln, ndtr
 
 from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
+from .growth import Factored
 from .model import WORDS, Unit
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
@@ -87,6 +88,7 @@ class Search:
         self.units = {u.id: u for u in units}
         self.candidates = candidates
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
+        self.last: tuple[tuple, Factored] | None = None
         self.tempering = 1.0
         self.corrections = corrections or {}
         self.shapes: dict[str, int] = {}  # kinds of own form that a unit may take
@@ -114,10 +116,11 @@ class Search:
 
     def _fit(self, members: tuple[tuple[str, int], ...], widths: dict[tuple[str, int], float] | None) -> Model:
         width = {m: (widths or {}).get(m) or self._usual(m) for m in members}
-        best = self._evidence(members, width)
+        best = None
         for m in members:
-            if (widths or {}).get(m) is None and len(self.candidates[m].widths) > 1:
-                best, width = self._widen(members, m, width, best)
+            if (widths or {}).get(m) is None:
+                best, width = self._widen(members, m, width)
+        best = best or self._evidence(members, width)
         value, index, mean, deviation = best
         value += sum(self.corrections.get(m[0], 0.0) for m in members)
         value += sum(
@@ -157,23 +160,29 @@ class Search:
         widths = self.candidates[m].widths
         return widths[len(widths) // 2]
 
-    def _widen(self, members, m, width, best):
-        """The best width of one member's prior: uphill over its grid from the usual one."""
-        grid = self.candidates[m].widths
-        at = grid.index(width[m])
+    def _widen(self, members, m, width):
+        """Evidence at the best width of one member's prior: uphill over its grid from where it is."""
+        c = self.candidates[m]
+        others = self._factored(tuple(o for o in members if o != m), width)
+        more = others.and_one_more(_joined([c.index, c.extra]).astype(int))
+
+        def evidence(w):
+            return more.log_evidence(*self._prior_of(m, w))
+
+        grid = c.widths
+        at = best_at = grid.index(width[m])
+        best = evidence(grid[at])
         for step in (1, -1):
             k = at + step
-            moved = False
             while 0 <= k < len(grid):
-                trial = {**width, m: grid[k]}
-                found = self._evidence(members, trial)
+                found = evidence(grid[k])
                 if found[0] <= best[0]:
                     break
-                best, width, moved = found, trial, True
+                best, best_at = found, k
                 k += step
-            if moved:
+            if best_at != at:
                 break
-        return best, width
+        return best, {**width, m: grid[best_at]}
 
     def _outside(self, m, width, index, mean, deviation) -> float:
         """Log of the posterior over the prior mass outside a prior's hole: of a unit's values beyond tolerance.
@@ -200,21 +209,33 @@ class Search:
         return max(1, len(self.units[unit].variants))
 
     def _evidence(self, members, width):
-        index, mean, sd, signs = [], [], [], []
-        for m in members:
-            c = self.candidates[m]
-            index += [c.index, c.extra]
-            mean += [c.mean, np.zeros(len(c.extra))]
-            sd += [c.sd * width[m], c.extra_sd]
-            signs += [c.signs, np.zeros(len(c.extra), int)]
-        if not members:
-            value, found, deviation = log_evidence(self.reduced, np.zeros(0, int), np.zeros(0), np.zeros(0))
-            return value, np.zeros(0, int), found, deviation
-        free = np.concatenate(index)
-        value, found, deviation = log_evidence(
-            self.reduced, free, np.concatenate(mean), np.concatenate(sd), np.concatenate(signs)
+        of = self._free(members, width)
+        value, found, deviation = log_evidence(self.reduced, *of)
+        return value, of[0], found, deviation
+
+    def _factored(self, members, width) -> Factored:
+        """A set ready for one member more; the last one is kept, for many are tried in addition to it."""
+        key = tuple((m, width[m]) for m in members)
+        if self.last is None or self.last[0] != key:
+            self.last = key, Factored(self.reduced, *self._free(members, width))
+        return self.last[1]
+
+    def _free(self, members, width) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(column,) indices of a set's columns, their priors' means and standard deviations, and their sides."""
+        index = _joined([x for m in members for x in (self.candidates[m].index, self.candidates[m].extra)])
+        priors = [self._prior_of(m, width[m]) for m in members]
+        mean, sd, signs = (_joined([p[k] for p in priors]) for k in range(3))
+        return index.astype(int), mean, sd, signs.astype(int)
+
+    def _prior_of(self, m, width) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(column,) means, standard deviations and sides of a member's prior that is so wide."""
+        c = self.candidates[m]
+        none = np.zeros(len(c.extra))
+        return (
+            np.concatenate([c.mean, none]),
+            np.concatenate([c.sd * width, c.extra_sd]),
+            np.concatenate([c.signs, none.astype(int)]),
         )
-        return value, free, found, deviation
 
     def log_prior(self, members: Sequence[tuple[str, int]]) -> float:
         """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size.

@@ -1,0 +1,151 @@
+"""Evidence of a set with one member more, from the factor of the set: the Schur complement of what is added."""
+
+import numpy as np
+
+from ..compiled import compiled
+from .evidence import Reduced, factored, factored_set, sided
+
+
+class Factored:
+    """A set of free parameters with their priors, factored once for all that may be added to it.
+
+    Parameters
+    ----------
+    r : the linear model
+    free : (column,) indices of the set's parameters
+    mean, sd, signs : (column,) of their priors, as ``log_evidence`` takes them
+    """
+
+    def __init__(self, r: Reduced, free: np.ndarray, mean: np.ndarray, sd: np.ndarray, signs: np.ndarray):
+        self.r, self.free, self.mean, self.sd, self.signs = r, free, mean, sd, signs
+        self.value, self.found, self.deviation, self.L, self.z = factored_set(
+            r.M, r.b, r.constant, r.fixed, free, mean, sd
+        )
+        at = r.fixed.copy()
+        at[free] = mean
+        on = np.flatnonzero(at)
+        self.gradient = r.b - r.M[:, on] @ at[on]
+        self.step = (self.found - mean) / sd if len(free) else np.zeros(0)
+        self.power = (self.deviation / sd) ** 2 if len(free) else np.zeros(0)
+
+    def and_one_more(self, more: np.ndarray) -> "OneMore":
+        """The same with some further parameters free (indices), before it is said how wide their priors are."""
+        return OneMore(self, more)
+
+
+class OneMore:
+    """A factored set with further free parameters, whose priors are tried one after another."""
+
+    def __init__(self, of: Factored, more: np.ndarray):
+        self.of, self.more = of, more
+        self.forward, self.back = _complement(of.r.M, of.L, of.free, of.sd, more)
+        self.left = of.r.M[np.ix_(more, more)] - self.forward @ self.forward.T
+
+    def log_evidence(
+        self, mean: np.ndarray, sd: np.ndarray, signs: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """As ``log_evidence`` of the set's parameters and then of these: value, indices, means, standard deviations."""
+        s = self.of
+        free = np.concatenate([s.free, self.more])
+        means, sds = np.concatenate([s.mean, mean]), np.concatenate([s.sd, sd])
+        if not np.isfinite(s.value):
+            return -np.inf, free, means, sds
+        gain, found, deviation = _grown(
+            self.forward, self.back, self.left, s.z, s.step, s.power, s.gradient[self.more],
+            mean - s.r.fixed[self.more], sd,
+        )  # fmt: skip
+        found, deviation = means + sds * found, sds * deviation
+        if not np.isfinite(gain):
+            return -np.inf, free, means, sds
+        value = s.value + gain + sided(s.r, free, np.concatenate([s.signs, signs]), found, deviation)
+        return value, free, found, deviation
+
+
+@compiled
+def _complement(M, L, free, sd, more):
+    """(further, column) L^-1 of the products of a set's columns (scaled) with further ones, and L^-T of these.
+
+    L has its transpose above the diagonal.
+    """
+    n, e = len(free), len(more)
+    forward = np.empty((e, n))
+    for m in range(e):
+        row, x = M[more[m]], forward[m]
+        for k in range(n):
+            x[k] = row[free[k]] * sd[k]
+        for k in range(n):
+            x[k] /= L[k, k]
+            f = x[k]
+            for q in range(k + 1, n):
+                x[q] -= f * L[k, q]
+    back = forward.copy()
+    for m in range(e):
+        x = back[m]
+        for k in range(n - 1, -1, -1):
+            x[k] /= L[k, k]
+            f = x[k]
+            for q in range(k):
+                x[q] -= f * L[k, q]
+    return forward, back
+
+
+@compiled
+def _grown(forward, back, left, z, step, power, gradient, away, sd):
+    """What further parameters add to a set's log evidence; means and standard deviations of all, in units of their
+    priors. ``away``: the further priors' means from where these parameters are off."""
+    e, n = forward.shape
+    gain = 0.0
+    here = np.empty(e)  # the gradient at the further priors' means, the set at its best
+    for k in range(e):
+        moved, met = 0.0, 0.0
+        for m in range(e):
+            moved += left[k, m] * away[m]
+        for q in range(n):
+            met += forward[k, q] * z[q]
+        here[k] = (gradient[k] - met - moved) * sd[k]
+        gain += (gradient[k] - met - 0.5 * moved) * away[k]
+    S = np.empty((e, e))
+    for k in range(e):
+        for m in range(e):
+            S[k, m] = left[k, m] * sd[k] * sd[m]
+        S[k, k] += 1.0
+    found, deviation = np.empty(n + e), np.empty(n + e)
+    if not factored(S):
+        return -np.inf, found, deviation
+    for k in range(e):
+        x = here[k]
+        for q in range(k):
+            x -= S[k, q] * here[q]
+        here[k] = x / S[k, k]
+        gain += 0.5 * here[k] * here[k] - np.log(S[k, k])
+    inverse = np.zeros((e, e))
+    for k in range(e):
+        for q in range(k):
+            f = S[k, q]
+            for m in range(q + 1):
+                inverse[k, m] -= f * inverse[q, m]
+        for m in range(k):
+            inverse[k, m] /= S[k, k]
+        inverse[k, k] = 1.0 / S[k, k]
+    for m in range(e):
+        best, own = 0.0, 0.0
+        for k in range(m, e):
+            best += inverse[k, m] * here[k]
+            own += inverse[k, m] * inverse[k, m]
+        found[n + m] = best
+        deviation[n + m] = np.sqrt(own)
+    rows = np.empty(e)
+    for k in range(n):
+        x = step[k]
+        for m in range(e):
+            rows[m] = back[m, k] * sd[m]
+            x -= rows[m] * found[n + m] + back[m, k] * away[m]
+        more = power[k]
+        for m in range(e):
+            f = 0.0
+            for q in range(m + 1):
+                f += inverse[m, q] * rows[q]
+            more += f * f
+        found[k] = x
+        deviation[k] = np.sqrt(more)
+    return gain, found, deviation
