@@ -49,6 +49,7 @@ class Bench(Settling):
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
         self.looked_at: tuple[str, ...] | None = None  # units of the set at which the weights were taken
+        self.leading: dict[bool, list[tuple[Choice, ...]]] = {}  # sets that the last search ended at, by ``sound``
 
     def fit(self, begun: "tuple[Bench, Fit] | None" = None) -> Fit:
         """Search and relinearise until the leading set stands still.
@@ -103,7 +104,7 @@ class Bench(Settling):
         self.describe(bench.described)
         self.point |= {n: v for n, v in fit.values.items() if n in self.point}
         self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
-        self.sound = bench.sound
+        self.sound, self.leading = bench.sound, dict(bench.leading)
         self.carried |= fit.carried
         # until they are fitted, what the others' fit leaves of further recordings is their noise
         as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
@@ -257,7 +258,8 @@ class Bench(Settling):
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
         search = self.searching(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
-        search.run()
+        search.run(self.leading.get(self.sound, ()))
+        self.leading[self.sound] = search.leading()
         return search
 
     def _carry_own_forms(self, search: Search) -> bool:

@@ -28,6 +28,13 @@ class Factored:
         self.step = (self.found - mean) / sd if len(free) else np.zeros(0)
         self.power = (self.deviation / sd) ** 2 if len(free) else np.zeros(0)
 
+    def log_evidence(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Value, indices, means and standard deviations of the set."""
+        if not np.isfinite(self.value):
+            return -np.inf, self.free, self.mean, self.sd
+        value = self.value + sided(self.r, self.free, self.signs, self.found, self.deviation)
+        return value, self.free, self.found, self.deviation
+
     def and_one_more(self, more: np.ndarray) -> "OneMore":
         """The same with some further parameters free (indices), before it is said how wide their priors are."""
         return OneMore(self, more)

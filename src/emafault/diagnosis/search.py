@@ -89,6 +89,10 @@ class Search:
         self.candidates = candidates
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
         self.last: tuple[tuple, Factored] | None = None
+        self.usual: dict[tuple[str, int], float] = {}  # widths of the priors of what led before
+        self.names = np.array(reduced.names, object)
+        self.paid: dict[tuple[str, int], float] = {}
+        self.priors: dict[tuple[tuple[str, int], float], tuple[np.ndarray, ...]] = {}
         self.tempering = 1.0
         self.corrections = corrections or {}
         self.shapes: dict[str, int] = {}  # kinds of own form that a unit may take
@@ -120,15 +124,12 @@ class Search:
         for m in members:
             if (widths or {}).get(m) is None:
                 best, width = self._widen(members, m, width)
-        best = best or self._evidence(members, width)
-        value, index, mean, deviation = best
-        value += sum(self.corrections.get(m[0], 0.0) for m in members)
-        value += sum(
-            self._outside(m, width[m], index, mean, deviation) for m in members if self.candidates[m].hole.size
-        )
-        value -= sum(np.log(len(self.candidates[m].widths)) for m in members)
-        value -= sum(np.log(self.variants(m[0])) for m in members)
-        names = [self.reduced.names[k] for k in index]
+        value, index, mean, deviation = best or self._factored(members, width).log_evidence()
+        for m in members:
+            value += self._paid(m)
+            if self.candidates[m].hole.size:
+                value += self._outside(m, width[m], index, mean, deviation)
+        names = self.names[index].tolist()
         return Model(
             tuple(Choice(m[0], m[1], width[m]) for m in members),
             self.tempering * value + self.log_prior(members),
@@ -136,6 +137,14 @@ class Search:
             dict(zip(names, mean.tolist(), strict=True)),
             dict(zip(names, deviation.tolist(), strict=True)),
         )
+
+    def _paid(self, m: tuple[str, int]) -> float:
+        """Log evidence that a member has beside its columns': what a closer look took off, and the choice of one of its
+        widths and variants."""
+        if m not in self.paid:
+            ways = len(self.candidates[m].widths) * self.variants(m[0])
+            self.paid[m] = self.corrections.get(m[0], 0.0) - float(np.log(ways))
+        return self.paid[m]
 
     def less(self, model: Model, unit: str) -> Model:
         """The set less a unit, the others' priors as wide as they are or as they were when it was looked at first."""
@@ -149,7 +158,7 @@ class Search:
         """The same set under the widest priors, whose estimates are shrunk the least."""
         members = tuple((c.unit, c.variant) for c in model.choices)
         _, index, mean, deviation = self._evidence(members, {m: self.candidates[m].widths[0] for m in members})
-        names = [self.reduced.names[k] for k in index]
+        names = self.names[index].tolist()
         return replace(
             model,
             deviations=dict(zip(names, mean.tolist(), strict=True)),
@@ -157,8 +166,10 @@ class Search:
         )
 
     def _usual(self, m: tuple[str, int]) -> float:
+        """The width that a member's prior is tried with first."""
         widths = self.candidates[m].widths
-        return widths[len(widths) // 2]
+        begun = self.usual.get(m)
+        return begun if begun in widths else widths[len(widths) // 2]
 
     def _widen(self, members, m, width):
         """Evidence at the best width of one member's prior: uphill over its grid from where it is."""
@@ -227,15 +238,17 @@ class Search:
         mean, sd, signs = (_joined([p[k] for p in priors]) for k in range(3))
         return index.astype(int), mean, sd, signs.astype(int)
 
-    def _prior_of(self, m, width) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _prior_of(self, m, width) -> tuple[np.ndarray, ...]:
         """(column,) means, standard deviations and sides of a member's prior that is so wide."""
-        c = self.candidates[m]
-        none = np.zeros(len(c.extra))
-        return (
-            np.concatenate([c.mean, none]),
-            np.concatenate([c.sd * width, c.extra_sd]),
-            np.concatenate([c.signs, none.astype(int)]),
-        )
+        if (m, width) not in self.priors:
+            c = self.candidates[m]
+            none = np.zeros(len(c.extra))
+            self.priors[m, width] = (
+                np.concatenate([c.mean, none]),
+                np.concatenate([c.sd * width, c.extra_sd]),
+                np.concatenate([c.signs, none.astype(int)]),
+            )
+        return self.priors[m, width]
 
     def log_prior(self, members: Sequence[tuple[str, int]]) -> float:
         """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size.
@@ -259,16 +272,42 @@ class Search:
         return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
 
     # ---- the search
-    def run(self, rounds: int = 8) -> list[Model]:
-        """Every set looked at, most probable first."""
-        self.fit(())
+    def run(self, begun: Sequence[tuple[Choice, ...]] = (), rounds: int = 8) -> list[Model]:
+        """Every set looked at, most probable first; ``begun``: sets that led where this search goes on from."""
+        self.usual |= {m: c.width for choices in reversed(begun) for m, c in self._here(choices).items()}
+        every = [tuple(sorted(self._here(choices))) for choices in begun]
+        causes = {m for m in self.candidates if self.units[m[0]].kind != "remainder"}
         # a remainder stands in for several causes at once, from which no single step leads back to them
-        self._climb(rounds, {m for m in self.candidates if self.units[m[0]].kind != "remainder"})
-        self._climb(rounds, set(self.candidates))
+        for among in (causes, set(self.candidates)):
+            for members in [(), *every]:
+                inside = tuple(m for m in members if m in among)
+                if np.isfinite(self.log_prior(inside)):
+                    self.fit(inside)
+            self._climb(rounds, among)
         # a unit in another form may take up what is another's, beside which its own form is the better again
         while self._complete():
             self._climb(rounds, set(self.candidates))
         return self.ranked()
+
+    def leading(self) -> list[tuple[Choice, ...]]:
+        """The likeliest sets, and the likeliest of those without a remainder: where a search may go on from."""
+        ranked = self.ranked()
+        causes = [m for m in ranked if all(self.units[u].kind != "remainder" for u in m.units)]
+        return [m.choices for few in (ranked, causes) for m in self._near(few)]
+
+    def _near(self, ranked: Sequence[Model]) -> list[Model]:
+        """The first of some sets that are worth extending."""
+        return [m for m in ranked[: 4 * BEAM] if m.log_posterior > ranked[0].log_posterior - NEAR]
+
+    def _here(self, choices: Sequence[Choice]) -> dict[tuple[str, int], Choice]:
+        """The candidates that a set's units are now."""
+        out = {}
+        for c in choices:
+            for variant in (c.variant, c.variant % OTHER_FORM, 0):
+                if (c.unit, variant) in self.candidates:
+                    out[c.unit, variant] = c
+                    break
+        return out
 
     def _complete(self) -> bool:
         """Add every candidate to the leading sets, for what is too small to be seen has its prior odds and is not left
@@ -286,9 +325,7 @@ class Search:
         """Extend the likeliest sets by some of the candidates until none is left that is worth it."""
         extended: set = set()
         for _ in range(rounds):
-            ranked = self.ranked()
-            todo = [m for m in ranked[: 4 * BEAM] if m.log_posterior > ranked[0].log_posterior - NEAR]
-            todo = [m for m in todo if m.choices not in extended][:BEAM]
+            todo = [m for m in self._near(self.ranked()) if m.choices not in extended][:BEAM]
             if not todo:
                 break
             for model in todo:
