@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_inline
 
 LONGEST = 5e-5  # s, of a step of the integration
 
@@ -17,34 +17,62 @@ def flexible_shaft(gear, interval, K, C, J, ground, play):
     n = gear.shape[0]
     position, torque = np.empty(n), np.empty(n)
     steps = int(np.ceil(interval / LONGEST))
-    h = interval / steps
-    x, v, start, slope = 0.0, 0.0, gear[0], 0.0
+    x, v, start, slope, side = 0.0, 0.0, gear[0], 0.0, 0.0
     for m in range(n):
         # the gear's motion between samples: the cubic through both, with the slopes of their neighbours' secants
         step, end = gear[m] - start, 0.5 * (gear[min(m + 1, n - 1)] - start)
-        bend, turn = 3.0 * step - 2.0 * slope - end, slope + end - 2.0 * step
+        motion = (start, slope, 3.0 * step - 2.0 * slope - end, slope + end - 2.0 * step)
         total = 0.0
         for k in range(steps):
-            s = (k + 0.5) / steps
-            g = start + s * (slope + s * (bend + s * turn))
-            rate = (slope + s * (2.0 * bend + 3.0 * s * turn)) / interval
-            gap = g - x
-            at = gap - 0.5 * h * v  # in the middle of the step, as g is
-            side = 1.0 if at > 0.5 * play else (-1.0 if at < -0.5 * play else 0.0)
-            stiffness, damping = (K, C) if side != 0.0 else (0.0, 0.0)
-            # implicit midpoint rule: second order, and stable however fast the damping is
-            twist = gap - 0.5 * side * play
-            half = 0.5 * h / J
-            middle = (v + half * (stiffness * twist + damping * rate)) / (
-                1.0 + half * (0.5 * h * stiffness + damping + ground)
-            )
-            push = stiffness * (twist - 0.5 * h * middle) + damping * (rate - middle)
-            x += h * middle
-            v = 2.0 * middle - v
+            s, length = k / steps, 1.0 / steps
+            before = _distance(motion, s, x, side, play)
+            ahead, faster, push = _moved(motion, s, length, interval, x, v, side, K, C, J, ground, play)
+            after = _distance(motion, s + length, ahead, side, play)
+            if after < 0.0:
+                # what is behind a play coasts with the speed that it has where the contact ends: there, not at a step
+                share = before / (before - after) if before > 0.0 else 0.0
+                x, v, push = _moved(motion, s, share * length, interval, x, v, side, K, C, J, ground, play)
+                total += share * push
+                s, length = s + share * length, (1.0 - share) * length
+                side = 0.0 if side != 0.0 else (1.0 if _gear(motion, s) > x else -1.0)
+                ahead, faster, push = _moved(motion, s, length, interval, x, v, side, K, C, J, ground, play)
+                push *= 1.0 - share
+            x, v = ahead, faster
             total += push
         start, slope = gear[m], end
         position[m], torque[m] = x, total / steps
     return position, torque
+
+
+@compiled_inline
+def _gear(motion, s):
+    """Angle of the gear at a share of the interval."""
+    start, slope, bend, turn = motion
+    return start + s * (slope + s * (bend + s * turn))
+
+
+@compiled_inline
+def _distance(motion, s, x, side, play):
+    """How far (rad) the shaft is in contact on a side, or from one where it is in none (0)."""
+    gap = _gear(motion, s) - x
+    return side * gap - 0.5 * play if side != 0.0 else 0.5 * play - abs(gap)
+
+
+@compiled_inline
+def _moved(motion, s, length, interval, x, v, side, K, C, J, ground, play):
+    """Angle and speed of the shaft after a share of the interval, and the torque on it, in contact on a side or not.
+
+    Implicit midpoint rule: second order, and stable however fast the damping is.
+    """
+    _, slope, bend, turn = motion
+    h, at = length * interval, s + 0.5 * length
+    rate = (slope + at * (2.0 * bend + 3.0 * at * turn)) / interval
+    stiffness, damping = (K, C) if side != 0.0 else (0.0, 0.0)
+    twist = _gear(motion, at) - x - 0.5 * side * play
+    half = 0.5 * h / J
+    middle = (v + half * (stiffness * twist + damping * rate)) / (1.0 + half * (0.5 * h * stiffness + damping + ground))
+    push = stiffness * (twist - 0.5 * h * middle) + damping * (rate - middle)
+    return x + h * middle, 2.0 * middle - v, push
 
 
 @compiled
