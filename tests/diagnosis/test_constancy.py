@@ -8,7 +8,8 @@ import pytest
 from emafault.diagnosis.constancy import log_odds_of_another_cause
 from emafault.diagnosis.evidence import Reduced
 from emafault.diagnosis.model import Parameter, Unit, Variant
-from emafault.diagnosis.search import OTHER_FORM, Candidate, Search
+from emafault.diagnosis.search import Search
+from emafault.diagnosis.sets import OTHER_FORM, Candidate
 
 FUNCTIONS = 6
 ROWS = 400

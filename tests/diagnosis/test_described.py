@@ -6,7 +6,8 @@ import pytest
 from emafault.diagnosis.described import Described, another_form_of, curve, with_forms
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
-from emafault.diagnosis.search import Choice, Model, Search
+from emafault.diagnosis.search import Search
+from emafault.diagnosis.sets import Choice, Model
 from emafault.diagnosis.whitening import Weights
 
 ROWS = 2000

@@ -10,7 +10,8 @@ from emafault.diagnosis.evidence import Reduced
 from emafault.diagnosis.linear import White
 from emafault.diagnosis.model import Parameter, Unit, Variant
 from emafault.diagnosis.naming import possible_place, read
-from emafault.diagnosis.search import Candidate, Choice, Model, Search
+from emafault.diagnosis.search import Search
+from emafault.diagnosis.sets import Candidate, Choice, Model
 from emafault.equations import held_out
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Unit, Variant
-from emafault.diagnosis.search import Choice, Model
+from emafault.diagnosis.sets import Choice, Model
 from emafault.diagnosis.settling import Began, between
 
 ROWS = 4000

@@ -5,7 +5,8 @@ import pytest
 
 from emafault.diagnosis.evidence import Normal, marginalise
 from emafault.diagnosis.model import Parameter, Unit, Variant
-from emafault.diagnosis.search import Candidate, Search
+from emafault.diagnosis.search import Search
+from emafault.diagnosis.sets import Candidate
 
 ROWS = 4000
 CAUSES = 30

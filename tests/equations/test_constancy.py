@@ -6,7 +6,8 @@ import pytest
 
 from emafault.diagnosis.constancy import PRIOR, log_odds_of_change
 from emafault.diagnosis.fit import Bench, Fit
-from emafault.diagnosis.search import Choice, Model, Search
+from emafault.diagnosis.search import Search
+from emafault.diagnosis.sets import Choice, Model
 from emafault.equations.diagnose import diagnose
 from emafault.equations.verdict import remainder_sentence
 

@@ -8,7 +8,7 @@ import pytest
 from emafault.diagnosis.closure import Ladder
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Unit
-from emafault.diagnosis.search import Choice, Model
+from emafault.diagnosis.sets import Choice, Model
 from emafault.equations import held_out
 from emafault.equations.held_out import _less
 

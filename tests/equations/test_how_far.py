@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from emafault.diagnosis.model import Unit
-from emafault.diagnosis.search import Choice, Model
+from emafault.diagnosis.sets import Choice, Model
 from emafault.equations.how_far import _insertable
 
 UNITS = {

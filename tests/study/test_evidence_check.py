@@ -8,7 +8,7 @@ from emafault.actuator.parameters import ActuatorParameters
 from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.evidence import Normal, marginalise
 from emafault.diagnosis.model import Unit, Variant
-from emafault.diagnosis.search import REMAINDER_SIZES, WIDTHS, Candidate
+from emafault.diagnosis.sets import REMAINDER_SIZES, WIDTHS, Candidate
 from emafault.study.evidence_check import check_draw, check_evidence, run_draws
 from emafault.study.evidence_draws import LinearBench, draw_truth, linear_bench
 from emafault.study.evidence_posterior import ARMS

@@ -17,7 +17,8 @@ from .evidence import Reduced, log_evidence
 from .fit import Bench, Fit
 from .linear import White, assemble
 from .model import WORDS
-from .search import ONE_MORE_FORM, OTHER_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR, Model
+from .set_prior import ONE_MORE_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR
+from .sets import OTHER_FORM, Model
 
 SCATTER = 0.1  # of a unit's own size, by which it may differ from recording to recording all the same
 #: of what changes, over an effect's range; beyond it too, for the range is that of the effect and not of what changes

@@ -10,7 +10,9 @@ from .forms import FORMS
 from .left import Left, beside_first, gain
 from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
-from .search import ONE_MORE_FORM, OTHER_FORM, Search
+from .search import Search
+from .set_prior import ONE_MORE_FORM
+from .sets import OTHER_FORM
 
 PROPOSED = 12  # forms that a scan proposes at most
 CHANNELED = 6  # of which, at most, are looked for in the channels of the measuring chain too

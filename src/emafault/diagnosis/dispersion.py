@@ -17,7 +17,7 @@ from .fit import Bench, Fit
 from .linear import white_rows
 from .model import SETTINGS
 from .point import is_parameter
-from .search import Model
+from .sets import Model
 from .whitening import filtered
 
 PARTS = 10  # of a recording

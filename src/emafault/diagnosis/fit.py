@@ -13,7 +13,8 @@ from .linearisation import Carried, Task
 from .model import LISTED
 from .naming import NAMED
 from .point import Place
-from .search import NEAR, OTHER_FORM, Choice, Model, Search
+from .search import NEAR, Search
+from .sets import OTHER_FORM, Choice, Model
 from .settling import Settling
 
 ROUNDS = 3

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.special import expit
 
 from .model import LISTED, SETTINGS, Unit
-from .search import Model, Search, posterior
+from .search import Search
+from .sets import Model, posterior
 
 NAMED = 0.9
 PRESENT = 0.5  # of a remainder, from which it is more likely there than not

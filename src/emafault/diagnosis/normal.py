@@ -13,7 +13,7 @@ from .linear import OWN_FORM, OWN_SHARES, White, assemble, full_model, white_row
 from .linearisation import Carried, Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .point import Point, is_parameter
-from .search import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
+from .sets import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
 
 
 class NormalEquations(Point):

@@ -7,7 +7,7 @@ import numpy as np
 
 from .linear import OWN_FORM
 from .model import TOLERANCES, Parameter, Unit, Variant
-from .search import OTHER_FORM, Choice
+from .sets import OTHER_FORM, Choice
 
 REACH = (1.0, TOLERANCES)  # prior standard deviations from the prior's mean that the point keeps to, at first and later
 

@@ -1,26 +1,18 @@
 """The posterior over sets of listed effects, described forms and equations with a remainder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import gammaln, ndtr
+from scipy.special import ndtr
 
 from ..compiled import compiled
 from .evidence import Reduced, factored, log_evidence
 from .growth import Factored
-from .model import WORDS, Unit
+from .model import Unit
+from .set_prior import SIZE_PRIOR, SetPrior
+from .sets import OTHER_FORM, Candidate, Choice, Model
 
-SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
-ONE_MORE_FORM = 0.3  # of a bench with any number of described forms, to have one more
-PROPOSED = 2  # forms that a scan proposed: what needs more of them is a remainder
-REMAINDER_PRIOR = 0.05  # of each equation to have one
-WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
-FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range no catalogue gives
-REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row
-OTHER_FORM = 10  # added to a variant's number, once for each kind of own form that the unit may take
-OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 ROUNDING = 1e-6  # of a prior's width, by which the data know a value no better
 TINY = 1e-12  # probability that counts as none
 BEAM = 4
@@ -28,48 +20,6 @@ ADDED = 15  # units tried in addition to a set
 SWAPPED = 5  # units tried in the place of each member
 COMPLETED = 4  # leading sets that every candidate is added to in the end
 NEAR = 12.0  # log posterior within which a set is worth extending
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One unit in a set: which of its variants, how wide its prior."""
-
-    unit: str
-    variant: int
-    width: float
-
-
-@dataclass
-class Model:
-    """A set with its log posterior (up to a constant), fitted deviations and their standard deviations; before it is
-    fitted, the choices alone."""
-
-    choices: tuple[Choice, ...]
-    log_posterior: float = 0.0
-    log_likelihood: float = 0.0
-    deviations: dict[str, float] = field(default_factory=dict)
-    spread: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Ids, sorted."""
-        return tuple(sorted(c.unit for c in self.choices))
-
-
-@dataclass
-class Candidate:
-    """A unit's variant ready for the linear model: indices, prior deviation and standard deviation, sides."""
-
-    index: np.ndarray
-    mean: np.ndarray
-    sd: np.ndarray
-    signs: np.ndarray
-    widths: tuple[float, ...]
-    names: list[str]
-    hole: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))  # its edges in standard deviations from off
-    within: np.ndarray = field(default_factory=lambda: np.zeros(0))  # tolerance, in the same
-    extra: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # own form
-    extra_sd: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Search:
@@ -95,13 +45,7 @@ class Search:
         self.priors: dict[tuple[tuple[str, int], float], tuple[np.ndarray, ...]] = {}
         self.tempering = 1.0
         self.corrections = corrections or {}
-        self.shapes: dict[str, int] = {}  # kinds of own form that a unit may take
-        for unit, variant in candidates:
-            self.shapes[unit] = max(self.shapes.get(unit, 0), variant // OTHER_FORM)
-        every = [u.kind for u in units]
-        listed = sum(k in ("structural", "calibration") for k in every)
-        self.counts = listed, len(WORDS), every.count("remainder")
-        self.of_controller = {u.id for u in units if u.of_controller}
+        self.prior = SetPrior(units, candidates, self.size_prior)
         flat = list(candidates.values())
         self.flat = (
             np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
@@ -251,25 +195,8 @@ class Search:
         return self.priors[m, width]
 
     def log_prior(self, members: Sequence[tuple[str, int]]) -> float:
-        """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size.
-
-        Described forms come one after the other, each of any kind: a set has the orders that they may come in.
-        """
-        kinds = [self.units[u].kind for u, _ in members]
-        listed = sum(k in ("structural", "calibration") for k in kinds)
-        controls = sum(u in self.of_controller for u, _ in members)
-        forms, left = kinds.count("form") - controls, kinds.count("remainder")
-        n_listed, n_forms, n_left = self.counts
-        own = [u for u, v in members if v >= OTHER_FORM]
-        if listed >= len(self.size_prior) or sum(self.units[u].proposed for u, _ in members) > PROPOSED:
-            return -np.inf
-        value = np.log(self.size_prior[listed]) - _log_choose(n_listed, listed)
-        value += np.log(1.0 - ONE_MORE_FORM) + forms * np.log(ONE_MORE_FORM / n_forms) + gammaln(forms + 1)
-        value -= sum(np.log(self.units[u].among) for u, _ in members)
-        value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
-        value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)
-        left, n_left = left + controls, n_left + len(self.of_controller)
-        return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
+        """Log prior probability of a set."""
+        return self.prior.log_of(members)
 
     # ---- the search
     def run(self, begun: Sequence[tuple[Choice, ...]] = (), rounds: int = 8) -> list[Model]:
@@ -403,25 +330,3 @@ def _gains(M, b, d, starts, index, mean, sd):
 
 def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate([np.zeros(0), *parts])
-
-
-@cache
-def _log_choose(n: int, k: int) -> float:
-    return float(np.sum(np.log(np.arange(n - k + 1, n + 1)))) - float(np.sum(np.log(np.arange(1, k + 1))))
-
-
-def inclusion(models: Sequence[Model]) -> dict[str, float]:
-    """Marginal posterior probability of each unit over the sets seen."""
-    weights = posterior(models)
-    out: dict[str, float] = {}
-    for m, w in zip(models, weights, strict=True):
-        for u in m.units:
-            out[u] = out.get(u, 0.0) + float(w)
-    return out
-
-
-def posterior(models: Sequence[Model]) -> np.ndarray:
-    """(model,) probabilities."""
-    logs = np.array([m.log_posterior for m in models])
-    w = np.exp(logs - logs.max())
-    return w / w.sum()

@@ -9,7 +9,8 @@ from .described import Described
 from .evidence import SETTLED, Normal
 from .normal import NormalEquations
 from .point import Place, is_parameter
-from .search import OTHER_FORM, Model, Search
+from .search import Search
+from .sets import OTHER_FORM, Model
 
 STEPS = 3  # of a set to its own optimum
 SHORTER = (0.1, 0.5)  # least and most of a step after which a set fits worse, that is tried next

@@ -12,7 +12,7 @@ from .constancy import log_mean
 from .evidence import CLEAR
 from .fit import Bench
 from .model import SETTINGS
-from .search import REMAINDER_PRIOR
+from .set_prior import REMAINDER_PRIOR
 
 
 def log_odds(bench: Bench, confirm: Sequence[str] = ()) -> dict[str, float]:

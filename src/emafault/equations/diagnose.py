@@ -12,7 +12,7 @@ from ..diagnosis import wandering
 from ..diagnosis.closure import Ladder
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import Reading, read
-from ..diagnosis.search import Model
+from ..diagnosis.sets import Model
 from ..effects import EFFECTS
 from ..effects.scaling import scaled
 from ..errors import InputError

@@ -15,7 +15,8 @@ from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
 from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, meet, read
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import NEAR, Model, Search, inclusion
+from ..diagnosis.search import NEAR, Search
+from ..diagnosis.sets import Model, inclusion
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White
 from ..diagnosis.naming import read
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Choice, Model
+from ..diagnosis.sets import Choice, Model
 from ..io.recording import Recording
 from . import electrical
 from .held_out import Explored, HeldOut

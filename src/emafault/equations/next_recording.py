@@ -17,7 +17,8 @@ from ..actuator.sensors import SensorNoise, measure
 from ..actuator.simulate import simulate, time_axis
 from ..diagnosis.evidence import Normal
 from ..diagnosis.fit import Bench, Fit
-from ..diagnosis.search import Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.sets import Model
 from ..io.recording import Recording
 from .machine import ReferenceActuator
 from .parameters import FAULTS

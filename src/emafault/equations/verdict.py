@@ -12,7 +12,8 @@ from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import Reading, possible_place, told_sets
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.sets import Model
 from ..diagnosis.where import where
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES

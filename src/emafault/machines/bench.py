@@ -7,7 +7,8 @@ import numpy as np
 from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import NOTHING, Bench, Fit
 from ..diagnosis.model import Unit, Variant
-from ..diagnosis.search import Candidate, Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.sets import Candidate, Model
 from .adapter import SMOOTH, WAVES
 
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # of a remainder over the noise of a row

@@ -11,7 +11,7 @@ from ..diagnosis.evidence import Reduced
 from ..diagnosis.fit import NOTHING, Fit
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Choice, Model
+from ..diagnosis.sets import Choice, Model
 from . import held_out, verdict
 from .adapter import Recorded
 from .bench import SETTLING, MeasuredBench

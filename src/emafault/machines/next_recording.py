@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..diagnosis.linear import White, compressed, white_rows
-from ..diagnosis.search import Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.sets import Model
 from .statement import Experiment, Machine, Rows
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..diagnosis.naming import possible_place, told_sets
 from ..diagnosis.point import is_parameter
-from ..diagnosis.search import Model
+from ..diagnosis.sets import Model
 from ..diagnosis.where import where
 from .held_out import whitened, with_functions
 from .statement import Machine, told

@@ -15,7 +15,8 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis.model import LISTED
-from ..diagnosis.search import OTHER_FORM, Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.sets import OTHER_FORM, Model
 from ..io.atomic import write_text
 from ..progress import say
 from ..reporting.evidence import draw_page

@@ -13,14 +13,8 @@ from ..actuator.sensors import SensorNoise
 from ..diagnosis.evidence import Normal, Reduced
 from ..diagnosis.fit import CARRYING, Bench
 from ..diagnosis.model import LISTED, WORDS, Unit
-from ..diagnosis.search import (
-    ONE_MORE_FORM,
-    OTHER_FORM,
-    OTHER_FORM_PRIOR,
-    REMAINDER_PRIOR,
-    SIZE_PRIOR,
-    Candidate,
-)  # fmt: skip
+from ..diagnosis.set_prior import ONE_MORE_FORM, OTHER_FORM_PRIOR, REMAINDER_PRIOR, SIZE_PRIOR
+from ..diagnosis.sets import OTHER_FORM, Candidate
 from ..equations.machine import ReferenceActuator
 from ..equations.signals import Signals, estimated_noise
 from ..io.bench import read_bench

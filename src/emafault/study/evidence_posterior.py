@@ -8,7 +8,9 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from ..diagnosis.evidence import Normal, marginalise
-from ..diagnosis.search import OTHER_FORM, OTHER_FORM_PRIOR, Model, Search
+from ..diagnosis.search import Search
+from ..diagnosis.set_prior import OTHER_FORM_PRIOR
+from ..diagnosis.sets import OTHER_FORM, Model
 from .evidence_draws import SIZE, LinearBench, allowed
 
 NEAR = 12.0  # log posterior within which a set has mass
