@@ -84,34 +84,53 @@ def read(
     undescribed = {u.id for u in units if u.kind == "form"} - {*forms, *of_controller}
     left = [any(u in undescribed or _is_left(u, kind) for u in m.units) for m in models]
     steady = [float(np.prod([1.0 - p for p in may.values()])) for may in wandering_of]
+    mass = _masses(models, weights, listed_of, np.where(left, 0.0, steady), acts)
+    of_machine = set(forms) - of_controller
+    beside = bool(counted or of_machine or [r for r in remainders if r not in OWN_BUSINESS])
+    if named or groups:
+        verdict = "partly" if beside else "group" if groups else "explained"
+    elif of_machine or (counted and mass.nothing >= 0.5):
+        verdict = "described"
+    else:
+        verdict = "no_gap" if mass.nothing >= 0.5 else "unknown"
+    places = _places(inclusion, {u: acts[u][0] for u in undescribed})
+    return Reading(named, groups, forms, remainders, inclusion, mass.sets, mass.empty, mass.unknown, places, verdict)
+
+
+@dataclass(frozen=True)
+class _Masses:
+    """Posterior mass by the listed effects of the sets, as a ``Reading`` has it; ``nothing``: that of no gap."""
+
+    sets: Sequence[tuple[tuple[str, ...], float, Model]]
+    empty: float
+    unknown: float
+    nothing: float
+
+
+def _masses(
+    models: Sequence[Model],
+    weights: Sequence[float],
+    listed_of: Sequence[tuple[str, ...]],
+    sure: np.ndarray,
+    acts: Mapping[str, Sequence[str]],
+) -> _Masses:
+    """``listed_of``, ``sure``: of each model the listed effects, and the probability that it leaves nothing
+    undescribed; ``acts``: equations of the units."""
     masses: dict[tuple[str, ...], float] = {}
     leading: dict[tuple[str, ...], Model] = {}
     empty = unknown = settings = 0.0
-    for model, w, listed, sure in zip(models, weights, listed_of, np.where(left, 0.0, steady), strict=True):
-        if listed:
-            masses[listed] = masses.get(listed, 0.0) + w
-            leading.setdefault(listed, model)
-            if all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed):
-                settings += w * float(sure)
-        else:
-            empty += w * float(sure)
-            unknown += w * float(1.0 - sure)
+    for model, w, listed, of_it in zip(models, weights, listed_of, sure.tolist(), strict=True):
+        if not listed:
+            empty += w * of_it
+            unknown += w * (1.0 - of_it)
+            continue
+        masses[listed] = masses.get(listed, 0.0) + w
+        leading.setdefault(listed, model)
+        if all(set(acts.get(u, ("",))) <= set(SETTINGS) for u in listed):
+            settings += w * of_it
     sets = sorted(((s, p, leading[s]) for s, p in masses.items()), key=lambda x: -x[1])
-    nothing = max(0.0, empty + settings)  # what is the controller's alone is no gap of the machine
-    of_machine = set(forms) - of_controller
-    beside = counted or of_machine or [r for r in remainders if r not in OWN_BUSINESS]
-    if named and not groups:
-        verdict = "partly" if beside else "explained"
-    elif groups:
-        verdict = "partly" if beside else "group"
-    elif of_machine or (counted and nothing >= 0.5):
-        verdict = "described"
-    elif nothing >= 0.5:
-        verdict = "no_gap"
-    else:
-        verdict = "unknown"
-    places = _places(inclusion, {u: acts[u][0] for u in undescribed})
-    return Reading(named, groups, forms, remainders, inclusion, sets, empty, unknown, places, verdict)
+    # what is the controller's alone is no gap of the machine
+    return _Masses(sets, empty, unknown, max(0.0, empty + settings))
 
 
 def _places(inclusion: Mapping[str, float], undescribed: Mapping[str, str]) -> dict[str, float]:
