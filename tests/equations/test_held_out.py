@@ -86,7 +86,9 @@ def test_beside_a_form_that_is_not_confirmed_no_set_of_that_equation_is_the_true
 def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     """Two causes that explain the same: once one is not told, the other is compared with nothing in its place."""
     alike = {"unit_calibration", "~ambient"}
-    monkeypatch.setattr(held_out, "_misfit", lambda _, model: 0.0 if alike & set(model.units) else 400.0)
+    monkeypatch.setattr(
+        held_out, "_misfit", lambda _, model, out="": 0.0 if (alike & set(model.units)) - {out} else 400.0
+    )
     kinds = {"unit_calibration": "calibration", "~ambient": "form", "remainder:electrical_a": "remainder"}
     units = {u: Unit(u, kind, ("electrical",), []) for u, kind in kinds.items()}
 
@@ -106,11 +108,37 @@ def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     assert account.base.units == ("remainder:electrical_a",)
 
 
+@pytest.mark.parametrize(("shows", "ratio"), [(False, 0.0), (True, 40.0)])
+def test_a_form_is_confirmed_by_what_it_adds_itself(monkeypatch, shows, ratio):
+    """What stands out in one explored recording distorts the rest where no form takes it: that the rest predicts better
+    beside it is no sign of it in the others."""
+    units = {"~bump": Unit("~bump", "form", ("bus",), []), "~lag": Unit("~lag", "form", ("sensor_angle",), [])}
+
+    def misfit(_, model, out=""):
+        there = "~bump" in model.units
+        return 100.0 + (0.0 if there else 80.0) + (90.0 if there and out and shows else 0.0)
+
+    monkeypatch.setattr(held_out, "_misfit", misfit)
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
+
+    def less(model, unit):
+        return fit(tuple((c.unit, c.variant) for c in model.choices if c.unit != unit))
+
+    search = SimpleNamespace(fit=fit, less=less, units=units, candidates=[(u, 0) for u in units])
+    explored = SimpleNamespace(fit=SimpleNamespace(models=[fit((("~bump", 0), ("~lag", 0)))], search=search))
+    account = held_out._Account(explored, [])
+    assert account.ratio("~bump") == ratio
+
+
 def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
     """Two forms that make up for each other: without one that is not told, the other predicts worse than nothing."""
     units = {u: Unit(u, "form", ("torque",), []) for u in ("~frequency", "~function")}
     misfits = {(): 400.0, ("~frequency",): 700.0, ("~function",): 900.0, ("~frequency", "~function"): 100.0}
-    monkeypatch.setattr(held_out, "_misfit", lambda _, model: misfits[model.units])
+    monkeypatch.setattr(
+        held_out, "_misfit", lambda _, model, out="": misfits[tuple(u for u in model.units if u != out)]
+    )
 
     def fit(members):
         return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})

@@ -17,6 +17,7 @@ from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, meet, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Search
 from ..diagnosis.sets import Model, inclusion
+from ..diagnosis.settling import Inserted
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ class _Account:
         self.leading = next((m for m in explored.fit.models if set(named) <= set(m.units)), explored.fit.models[0])
         self.gone: set[str] = set()
         self.instead_of: dict[str, int] = {}  # remainders in the place of what is gone, and their variants
-        self.misfits: dict[tuple, float] = {}
+        self.misfits: dict[tuple, float] = {}  # of sets, and of sets less a unit
 
     def let_go(self, unit: str, left: bool = False) -> None:
         """A unit that is not told: from here on it stands in for no other; ``left``: a remainder does in its place."""
@@ -261,13 +262,14 @@ class _Account:
             mine = [(c.unit, c.variant) for c in self.base.choices if c.unit != unit]
             mine += [(c.unit, c.variant) for c in first.choices if c.unit == unit]
             inside = self.search.fit(tuple(mine))
-        return self._over_less(inside, unit)
+        ratio = self._over_less(inside, unit)
+        return ratio if self.search.units[unit].kind in LISTED else min(ratio, self._by_itself(inside, unit))
 
     def of_remainder(self, unit: str) -> float:
         """Of the likeliest set with a remainder over the same without it; 0 where the explored recordings had none."""
         self.gone.discard(unit)
         first = self._likeliest(unit)
-        return 0.0 if first is None else self._over_less(first, unit)
+        return 0.0 if first is None else min(self._over_less(first, unit), self._by_itself(first, unit))
 
     def instead(self, unit: str) -> float:
         """Of the likeliest set with a unit, a remainder in that one's place, over the same with nothing there; 0 where
@@ -275,8 +277,10 @@ class _Account:
         first = self._likeliest(unit)
         if first is None:
             return 0.0
-        nothing, remainder = (self._misfit(_less(self.search, first, unit, left)) for left in (False, True))
-        return 0.5 * (nothing - remainder)
+        nothing, instead = (_less(self.search, first, unit, left) for left in (False, True))
+        ratio = 0.5 * (self._misfit(nothing) - self._misfit(instead))
+        added = set(instead.units) - set(nothing.units)
+        return min([ratio, *(self._by_itself(instead, u) for u in added)])
 
     def _likeliest(self, unit: str) -> Model | None:
         """Of the explored recordings' sets with a unit, less what has been let go."""
@@ -286,10 +290,16 @@ class _Account:
     def _over_less(self, inside: Model, unit: str) -> float:
         return 0.5 * (self._misfit(self.search.less(inside, unit)) - self._misfit(inside))
 
-    def _misfit(self, model: Model) -> float:
-        if model.choices not in self.misfits:
-            self.misfits[model.choices] = _misfit(self.explored, model)
-        return self.misfits[model.choices]
+    def _by_itself(self, inside: Model, unit: str) -> float:
+        """Of a set over the same with a form or remainder taken out and all else where it is: what it gains beyond that
+        it has from what others need not stand in for, which is no sign of it in the confirm recordings."""
+        return 0.5 * (self._misfit(inside, unit) - self._misfit(inside))
+
+    def _misfit(self, model: Model, out: str = "") -> float:
+        key = model.choices, out
+        if key not in self.misfits:
+            self.misfits[key] = _misfit(self.explored, model, out)
+        return self.misfits[key]
 
 
 def _less(search: Search, model: Model, unit: str, left: bool) -> Model:
@@ -304,8 +314,9 @@ def _less(search: Search, model: Model, unit: str, left: bool) -> Model:
     return max(found, key=lambda m: m.log_posterior)
 
 
-def _misfit(explored: Explored, model: Model) -> float:
-    """-2 log predictive density of the confirm recordings under a set fitted to the explored ones, up to a constant.
+def _misfit(explored: Explored, model: Model, out: str = "") -> float:
+    """-2 log predictive density of the confirm recordings under a set fitted to the explored ones, up to a constant;
+    ``out``: a unit of it that is taken out once it is fitted.
 
     Remainders are integrated: what all recordings share over the posterior of the explored ones, what each has of its
     own over its prior. The noise's part of the misfit, which goes with the coefficients that noise is multiplied by, is
@@ -313,6 +324,8 @@ def _misfit(explored: Explored, model: Model) -> float:
     """
     ladder, fit = explored.ladder, explored.fit
     inserted = explored.bench.inserted(model, fit.normal)
+    if out:
+        model, inserted = _taken_out(explored, model, inserted, out)
     also = [n for n in model.deviations if is_parameter(n)]
     shared, own = _remainders(fit.search, model)
     whites = ladder.blocks(
@@ -331,6 +344,20 @@ def _misfit(explored: Explored, model: Model) -> float:
     after = Definite(normal.H + precision)
     found -= float(normal.g @ after.solve(normal.g))
     return found + 2.0 * (after.half_log_determinant() - Definite(precision).half_log_determinant())
+
+
+def _taken_out(explored: Explored, model: Model, inserted: Inserted, unit: str) -> tuple[Model, Inserted]:
+    """A fitted set less one of its forms or remainders, all else where it is."""
+    names = {
+        n for c in model.choices if c.unit == unit for n in explored.fit.search.candidates[c.unit, c.variant].names
+    }
+    off = {n: p.off for n, p in explored.bench.parameters.items() if n in names}
+    left = tuple(c for c in model.choices if c.unit != unit)
+    deviations = {n: d for n, d in model.deviations.items() if n not in names}
+    beside = {n: x for n, x in inserted.beside.items() if n not in names}
+    return replace(model, choices=left, deviations=deviations), replace(
+        inserted, values=inserted.values | off, beside=beside
+    )
 
 
 def _remainders(search: Search, model: Model) -> tuple[dict[str, float], dict[str, float]]:
