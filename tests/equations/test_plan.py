@@ -39,6 +39,14 @@ def test_a_bench_that_leaves_nothing_open_is_told_so(tmp_path, capsys):
     assert "Nothing to record" in capsys.readouterr().out
 
 
+def test_what_no_recording_distinguishes_is_said_and_no_motion_is_written_for_it(tmp_path, capsys):
+    alike = ENTRY | {"separates": ["load_constant", "friction_asymmetry"], "expected_odds": 1.0004}
+    assert main(["plan", verdict(tmp_path, next_experiment=[ENTRY, alike]), "--out", str(tmp_path / "plan")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "No recording of the menu distinguishes load constant from friction asymmetry"
+    assert [p.name for p in (tmp_path / "plan").iterdir()] == ["1_sine.csv"]
+
+
 def test_sets_are_distinguished_in_words():
     assert separated(["stribeck", "cogging"]) == "stribeck from cogging"
     assert separated(["stribeck", "no_gap"]) == "stribeck from no gap"

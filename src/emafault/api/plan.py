@@ -26,7 +26,10 @@ class Plan:
     @property
     def motions(self) -> dict[str, np.ndarray]:
         """By name, (time, 2) time (s) and commanded position of the user shaft (rad)."""
-        return {f"{n}_{e['motion']['name']}": planning.motion_of(e) for n, e in enumerate(self.entries, start=1)}
+        return {
+            f"{n}_{e['motion']['name']}": planning.motion_of(e)
+            for n, e in enumerate(filter(planning.decides, self.entries), start=1)
+        }
 
     def table(self) -> Table:
         """A row a recording: command, ambient temperature (degC), what it distinguishes, expected Bayes factor."""
@@ -55,7 +58,7 @@ class Plan:
         return "\n".join(planning.sentences(self.entries))
 
     def _repr_html_(self) -> str:
-        return self.table()._repr_html_() + (as_html(self.plot(), repr(self)) if self.entries else repr(self))
+        return self.table()._repr_html_() + (as_html(self.plot(), repr(self)) if self.motions else repr(self))
 
 
 def plan(

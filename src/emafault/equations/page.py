@@ -15,7 +15,7 @@ from ..reporting.regions import add_regions
 from ..reporting.retrained import MARK
 from .probabilities import basis
 from .quality import in_cells
-from .sentences import finding, fitted, separated
+from .sentences import decides, finding, fitted, separated
 
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
@@ -173,7 +173,7 @@ def _add_next(page: Page, experiments: Sequence[Mapping[str, Any]]) -> None:
     page.heading("What to record next")
     rows = [
         [
-            e["command"], f"{e['ambient_temperature']:g} °C",
+            *([e["command"], f"{e['ambient_temperature']:g} °C"] if decides(e) else ["none of the menu", ""]),
             separated(e["separates"]), f"{e['expected_odds']:.3g}",
         ]
         for e in experiments

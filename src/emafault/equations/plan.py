@@ -15,7 +15,7 @@ from ..paths import results_folder
 from ..places import file_name, refuse_folder, refuse_irregular
 from ..plain import read_json
 from .run import diagnosed, read_within
-from .sentences import separated
+from .sentences import decides, separated
 
 HEADER = "time_s,position_rad"
 PLAYED = 1e-3  # s between two positions of a motion
@@ -46,21 +46,25 @@ def plan(path: str | Path, spec: Mapping[str, Any], out: str | Path | None = Non
     entries = (read or _diagnosed(path, spec))["next_experiment"]
     written = write_motions(entries, folder)
     for n, line in enumerate(sentences(entries)):
-        print(f"{line} ({written[n]})" if written else line)
+        print(f"{line} ({written[n]})" if n < len(written) else line)
     return written
 
 
 def sentences(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """What to record next, a line each, numbered; one line that says so where there is nothing."""
+    if not entries:
+        return ["Nothing to record: no other explanation of these recordings is left."]
+    told, idle = [e for e in entries if decides(e)], [e for e in entries if not decides(e)]
     return [
         f"{n}. {entry['command']}, ambient temperature {entry['ambient_temperature']:g} degC: distinguishes "
         f"{separated(entry['separates'])}, expected Bayes factor {entry['expected_odds']:.3g}"
-        for n, entry in enumerate(entries, start=1)
-    ] or ["Nothing to record: no other explanation of these recordings is left."]
+        for n, entry in enumerate(told, start=1)
+    ] + [f"No recording of the menu distinguishes {separated(entry['separates'])}" for entry in idle]
 
 
 def write_motions(entries: Sequence[Mapping[str, Any]], folder: str | Path, force: bool = True) -> list[Path]:
-    """Write the motion of every entry as a table of time (s) and position (rad).
+    """Write the motion of every entry that is expected to distinguish anything, as a table of time (s) and position
+    (rad).
 
     Raises
     ------
@@ -68,7 +72,7 @@ def write_motions(entries: Sequence[Mapping[str, Any]], folder: str | Path, forc
     """
     _refuse_foreign(Path(folder), force)
     written = []
-    for n, entry in enumerate(entries, start=1):
+    for n, entry in enumerate(filter(decides, entries), start=1):
         target = Path(folder) / f"{n}_{entry['motion']['name']}.csv"
         write_text(target, _as_text(motion_of(entry)))
         written.append(target)

@@ -92,6 +92,11 @@ def fitted(entry: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
+def decides(entry: Mapping[str, Any]) -> bool:
+    """Whether a recording of the menu is expected to distinguish anything, in the digits that are told."""
+    return float(f"{entry['expected_odds']:.3g}") > 1.0
+
+
 def separated(sets: Sequence[str]) -> str:
     """What a recording distinguishes: the leading set from a rival, each as the verdict file joins its effects."""
     first, rival = (s.split("+") for s in sets)

@@ -13,6 +13,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..equations.diagnose import diagnose
 from ..equations.next_recording import INTERVAL, MENU
+from ..equations.sentences import decides
 from ..io.bench import read_bench
 from ..io.split import split_bench
 from ..withheld.benches import write_bench
@@ -118,7 +119,7 @@ def _diagnosed(
         write_bench(case, bench, actuator, noise)
         brought = read_bench(bench, actuator)
     found = diagnose(brought.name, brought.recordings, split_bench(brought.recordings), actuator, noise)
-    return found.verdict, found.next_experiments()
+    return found.verdict, [e for e in found.next_experiments() if decides(e)]
 
 
 def _one_left(verdict: Mapping[str, Any]) -> bool:
