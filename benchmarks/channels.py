@@ -105,6 +105,16 @@ def both(
     return lambda x, n: then(first(x, n), n)
 
 
+def standing_still(r: Recording, n: int) -> Recording:
+    """A recorder that repeats one sample of every channel 25 times."""
+    names = ("phase_voltage", "phase_current", "phase_current_end", "bus_voltage", "rotor_speed", "rotor_angle")
+    at = int(np.random.default_rng(n).integers(200, len(r.time) - 200))
+    out = {name: getattr(r, name).copy() for name in (*names, "output_position") if getattr(r, name) is not None}
+    for x in out.values():
+        x[at : at + 25] = x[at]
+    return replace(r, **out)
+
+
 def bent(i: np.ndarray) -> np.ndarray:
     """Currents of channels that are 1 % low at 5 A, with the square of the current."""
     return i * (1.0 - 0.002 * np.abs(i))
@@ -159,6 +169,10 @@ CHANNELS = {
     "spikes of the motion": changed(
         "spikes in position", "spikes in sensor_speed", "spikes in sensor_angle",
         output_position=spiked(0.05), rotor_speed=spiked(100.0), rotor_angle=spiked(20.0),
+    ),
+    "recorder that stands still for 5 ms": Channel(
+        itself=("held in sensor_current", "held in sensor_voltage", "held in bus", "held in position"),
+        change=standing_still,
     ),
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n

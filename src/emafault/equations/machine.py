@@ -317,9 +317,9 @@ def _by_lag(name: str, lag: float) -> np.ndarray:
 
 
 def _known(state: State, equation: str) -> np.ndarray | bool:
-    """(row,) where no current or voltage that an equation needs is cut off."""
-    lost = state.rec.lost
-    if equation in ("sensor_speed", "position") or not lost.any():
+    """(row,) where nothing that an equation needs is cut off, a spike or not recorded."""
+    lost = state.rec.stalled if equation in ("sensor_speed", "position") else state.rec.lost
+    if not lost.any():
         return True
     of = rows_of(state, equation)
     return ~lost if of is None else of(lost) == 0.0

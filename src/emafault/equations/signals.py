@@ -13,7 +13,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
-from ..io.sensors import calm_motion, cut_off, without_spikes
+from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
@@ -45,7 +45,8 @@ class Signals:
     ambient: float
     health: str
     noise: SensorNoise
-    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it
+    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it, or all stalled
+    stalled: np.ndarray  # (sample,) bool: nothing was recorded, or not long before or after
     zero_error: float = 0.0  # electrical rad, standard error of the angle's zero, where it was fitted to the voltages
     speed_step: float = 0.0  # rad/s, of a channel whose values lie on a lattice, as the next two
     current_step: float = 0.0  # A
@@ -54,7 +55,11 @@ class Signals:
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
         r = calm_motion(recording)
-        lost = np.zeros(len(r.time), bool)
+        stood = stalled(r)
+        if stood.any():
+            r = bridged(r, stood)
+            stood = binary_dilation(stood, iterations=1 + odd(SPEED_SPAN / r.interval) // 2)
+        lost = stood.copy()
         for cut in cut_off(r).values():
             lost |= binary_dilation(cut.any(axis=1))
         current, rows = without_spikes(r.phase_current)
@@ -66,7 +71,8 @@ class Signals:
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
-            noise, lost, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)), lattice_step(r.rotor_speed),
+            noise, lost, stood, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
+            lattice_step(r.rotor_speed),
             max(lattice_step(x) for x in r.phase_current.T), counts if counts > noise.position else 0.0,
         )  # fmt: skip
 

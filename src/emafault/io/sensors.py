@@ -102,6 +102,34 @@ def calm_motion(recording: Recording) -> Recording:
     return replace(recording, rotor_angle=angle, rotor_speed=speed, output_position=output)
 
 
+def stalled(recording: Recording) -> np.ndarray:
+    """(sample,) bool: where the recorder stood still while the rotor turned: every channel repeats the sample before to
+    the last digit, and the angle then makes up for it."""
+    channels = (recording.phase_voltage, recording.phase_current, recording.rotor_angle[:, None])
+    same = np.append(False, np.all([(np.diff(x, axis=0) == 0.0).all(axis=1) for x in channels], axis=0))
+    out, angle, count = np.zeros(len(same), bool), recording.rotor_angle, len(same)
+    edges = np.flatnonzero(np.diff(same, append=False))
+    for before, last in edges.reshape(-1, 2):
+        length = last - before
+        beyond = min(last + 1 + length, count - 1)
+        if beyond > last + 1:
+            step = abs(angle[beyond] - angle[last + 1]) / (beyond - last - 1)
+            out[before + 1 : last + 1] = abs(angle[last + 1] - angle[last]) > 0.5 * step * (length + 1)
+    return out
+
+
+def bridged(recording: Recording, rows: np.ndarray) -> Recording:
+    """A recording whose signals go straight across some rows (sample,) bool."""
+    at, kept = np.arange(len(rows)), np.flatnonzero(~rows)
+    names = ("phase_voltage", "phase_current", "phase_current_end", "bus_voltage", *MOTION)
+    found = {n: x for n in names if (x := getattr(recording, n)) is not None}
+    across = {
+        n: np.column_stack([np.interp(at, kept, c[kept]) for c in x.reshape(len(rows), -1).T]).reshape(x.shape)
+        for n, x in found.items()
+    }
+    return replace(recording, **across)  # type: ignore[arg-type]
+
+
 def _follows(wanted: np.ndarray, got: np.ndarray, slopes: tuple[float, float] = OF_SPEED) -> tuple[bool, float, float]:
     """Whether ``got`` goes with ``wanted``: slope near one and alike; both figures."""
     slope = float(wanted @ got / max(wanted @ wanted, 1e-30))
