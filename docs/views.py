@@ -423,4 +423,11 @@ FORM_VIEWS = {
         "a rise from zero that follows the speed late and smoothed",
         "It depends on what went before: the same speed, later in the recording, has another value.",
     ),
+    "travel": FormView(
+        "time",
+        {"length": 3.0},
+        (FORM_SIZE,),
+        "a drag that is there against the motion once the rotor has turned by some radians since it turned round",
+        "It changes with the travel since the last reversal, however long that took; dry friction jumps at once.",
+    ),
 }

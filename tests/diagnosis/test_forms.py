@@ -79,6 +79,7 @@ CASES = [
     ("power", {"exponent": 2.0}, (0.4,), 1),
     ("memory", {"source": 0.0, "time_constant": 0.12}, (0.05,), 1),
     ("memory", {"source": 2.0, "time_constant": 0.1}, (0.6,), 0),
+    ("travel", {"length": 1.5}, (0.4,), 0),
 ]
 
 

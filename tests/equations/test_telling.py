@@ -35,6 +35,15 @@ def test_what_is_the_machines_stays_there(change, equation, form):
     assert (said["equation"], said["form"]) == (equation, form)
 
 
+def test_a_drag_that_builds_up_over_travel_is_a_memory_along_the_angle():
+    form = Described("~t", "travel", "torque", 0, (("length", 4.2, 0.1, "rad"),), 0.1, 1.0)
+    said = telling.told(form, {"amplitude": (0.018, 1e-4)}, ACTUATOR)
+    assert (said["equation"], said["form"], said["along"]) == ("torque", "memory", "rotor_angle")
+    assert said["sentence"] == (
+        "In the torque equation: a drag of 0.018 N m builds up anew after each reversal, over a travel of 4.2 rad."
+    )
+
+
 def test_a_wave_of_the_recorded_angle_moves_the_commutations_of_the_point():
     recording = recorded("reversal")
     wave = 2e-4 * np.cos(recording.rotor_angle)

@@ -46,7 +46,7 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
     "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
-    "time_constant": (1e-4, 1e6, "s"), "lag": (-1.0, 1.0, "recording intervals"),
+    "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
@@ -56,6 +56,7 @@ SHAPES = {
     "order": ("amplitude", "order", "phase"), "frequency": ("amplitude", "frequency", "phase"),
     "step_change": ("jump", "time"), "power": ("at_100_rad_s", "exponent"), "bump": ("depth", "centre", "width"),
     "memory": ("gain", "time_constant", "source"), "function": ("along", "from", "to", "values"),
+    "travel": ("amplitude", "length"),
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
@@ -75,15 +76,16 @@ def forms_at(place: str) -> list[str]:
     """Forms that a place may have."""
     if place in CONTROLLER:
         return list(OF_CONTROLLER)
+    shapes = [form for form in SHAPES if form != "travel" or place == "torque"]
     if place not in CHANNELS:
-        return list(SHAPES)
+        return shapes
     quantity, _, phase = place.partition("_")
     phased = quantity in ("voltage", "current")
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased,
         "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output"),
     }  # fmt: skip
-    return [*SHAPES, *(form for form in OF_CHANNELS if only.get(form, True))]
+    return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]
 
 
 def of_recording(entry: Mapping[str, Any], recording: str) -> dict[str, Any]:

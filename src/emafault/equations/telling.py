@@ -138,7 +138,7 @@ def _word(form: Described) -> str:
         return "drift"
     if form.word == "function" and form.driver:
         return "coefficient"
-    return "function" if form.word == "power" else form.word
+    return {"power": "function", "travel": "memory"}.get(form.word, form.word)
 
 
 def picture(form: Described, found: Mapping[str, list[float]], actuator: ActuatorParameters) -> dict[str, Any]:
@@ -183,6 +183,8 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         source = memory.SOURCES[int(form.values["source"])]
         by = f"drifts by {of('offset')} from the start" if "offset" in found else f"builds up with the {WORDS[source]}"
         says = f"{what} {by}, with a time constant of {of('time_constant')}"
+    elif form.word == "travel":
+        says = f"a drag of {of('amplitude')} builds up anew after each reversal, over a travel of {of('length')}"
     else:
         knots = [found[n] for n in function.VALUES]
         low, high = min(v for v, _ in knots), max(v for v, _ in knots)

@@ -65,6 +65,7 @@ EFFECTS = {
 FORMS = {
     "order": "wave along the rotor angle", "frequency": "oscillation", "bump": "bump", "step_change": "step",
     "function": "function", "power": "power of the speed", "memory": "low-pass filtered part",
+    "travel": "drag that builds up",
 }  # fmt: skip
 _PASSING = {
     "ahead_out": "forward, the current flowing out of the staying phase", "ahead_in": "forward, flowing into it",
