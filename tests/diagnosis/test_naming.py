@@ -128,7 +128,7 @@ def held(
         less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)), units=units,
     )  # fmt: skip
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
-    monkeypatch.setattr(held_out, "_misfit", lambda explored, m: misfit[m.units])
+    monkeypatch.setattr(held_out, "_misfit", lambda explored, m, out="": misfit[tuple(u for u in m.units if u != out)])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
     monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect: another)
     explored = held_out.Explored(None, SimpleNamespace(models=explored, search=search), None)
