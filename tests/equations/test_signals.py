@@ -1,37 +1,107 @@
-"""What a recorder that stands still leaves out of the equations."""
+"""Noise of channels: estimated, or as recordings state it."""
 
 from dataclasses import asdict, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
-from emafault.io.sensors import stalled
+from emafault.equations.signals import STRETCH, Signals, estimated_noise
+from emafault.io.lattice import spacing
+from emafault.io.sensors import spikes
 
-from .conftest import NOISE, machine_of, recorded
-from .test_residuals import mean_squares, truth
-
-SIGNALS = ("phase_voltage", "phase_current", "phase_current_end", "rotor_speed", "rotor_angle", "output_position")
-
-
-def standing_still(recording, at, length):
-    """The recording with one sample of every channel repeated."""
-    out = {n: getattr(recording, n).copy() for n in SIGNALS}
-    for x in out.values():
-        x[at : at + length + 1] = x[at]
-    return replace(recording, **out)
+from .conftest import ACTUATOR, NOISE, in_steps, machine_of, recorded
 
 
-@pytest.mark.parametrize("length", [3, 25])
-def test_a_recorder_that_stands_still_is_seen_and_leaves_nothing(length):
-    recording = standing_still(recorded("parabolic"), 2000, length)
-    assert np.flatnonzero(stalled(recording)).tolist() == list(range(2001, 2001 + length))
+def test_stated_noise_is_taken_where_every_recording_states_it():
+    plain = recorded()
+    stating = [replace(plain, known={"phase_voltage": {"noise": sigma}}) for sigma in (0.3, 0.4)]
+    own = estimated_noise([plain, plain], NOISE)
+    assert estimated_noise([stating[0], plain], NOISE) == own and own.voltage == NOISE.voltage
+    stated = estimated_noise(stating, NOISE)
+    assert stated.voltage == pytest.approx((0.5 * (0.09 + 0.16)) ** 0.5) and stated.current == own.current
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05, 0.5])
+def test_the_currents_noise_is_found_whatever_their_offsets(offset):
+    of_unit = {"current_offset": {"o_a": offset, "o_b": -0.6 * offset, "o_c": 0.3 * offset}}
+    recordings = [recorded(effects=of_unit, seed=seed) for seed in range(3)]
+    found = estimated_noise(recordings, SensorNoise(**{**asdict(NOISE), "current": 0.02, "current_end": 0.05}))
+    assert found.current == pytest.approx(NOISE.current, rel=0.08)
+    assert found.current_end == pytest.approx(NOISE.current_end, rel=0.08)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.05, 0.09])
+def test_coarse_steps_of_the_currents_are_noise_and_no_spikes(step):
+    """Most sums of three rounded currents are the same; where one is taken for a spike, the lattice is lost."""
+    recordings = [in_steps(recorded(c, seed=n), {"phase_current": step}) for n, c in enumerate(("sine", "reversal"))]
+    rounding = step / np.sqrt(12.0)
+    found = estimated_noise(recordings, NOISE).current
+    assert 0.999 * rounding < found < 1.05 * np.hypot(rounding, NOISE.current)
+    for recording in recordings:
+        assert len(spikes(recording.phase_current)) == 0
+        assert Signals.of("a.nc", recording, ACTUATOR, NOISE).current_step == pytest.approx(step)
+
+
+def test_over_a_stretch_of_a_slow_current_in_steps_the_error_is_one():
+    step = 0.05
+    plain = recorded("parabolic")
+    fine, coarse = (Signals.of("a.nc", r, ACTUATOR, NOISE) for r in (plain, in_steps(plain, {"phase_current": step})))
+    assert fine.stretches() == []
+    found = coarse.stretches()
+    assert found and all(s.stop - s.start >= STRETCH for s in found)
+    assert all(one.stop <= other.start for one, other in pairwise(found))
+    error = coarse.level - fine.level
+    assert all(np.ptp(coarse.level[s]) < 1.5 * step for s in found)
+    of_stretches = np.array([error[s].mean() for s in found])
+    longest = max(found, key=lambda s: s.stop - s.start)
+    # white noise of so many samples would be far less
+    assert np.abs(of_stretches).max() > 5.0 * step / np.sqrt(12.0 * (longest.stop - longest.start))
+
+
+def test_an_encoder_s_counts_are_noise_of_rounding_however_evenly_it_turns():
+    counts = 2.0 * np.pi / 4096.0
+    turning = [in_steps(recorded(c, seed=n), {"rotor_angle": counts}) for n, c in enumerate(("reversal", "parabolic"))]
+    assert estimated_noise(turning, NOISE).angle == pytest.approx(counts / np.sqrt(12.0), rel=0.2)
+    evenly = replace(turning[0], rotor_angle=counts * np.round(np.arange(4000) * 20.5))
+    assert estimated_noise([evenly], NOISE).angle == pytest.approx(counts / np.sqrt(12.0))
+    assert spacing(turning[0].rotor_angle) == pytest.approx(counts) and spacing(recorded().rotor_angle) == 0.0
+
+
+def test_of_an_output_in_counts_the_rounding_goes_with_its_place():
+    counts = 1e-4
+    recording = in_steps(recorded("parabolic"), {"output_position": counts})
     machine = machine_of({"a.nc": recording})
-    assert max(mean_squares(machine, truth(machine, recording)).values()) < 1.5
+    (block,) = (
+        b for b in machine.blocks({n: p.off for n, p in machine.parameters.items()}, "a.nc") if b.equation == "position"
+    )
+    names = [n for n in block.columns if n.startswith("counts.")]
+    columns = np.array([block.columns[n] for n in names]).T[block.usable]
+    left = block.residual[block.usable]
+    fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+    assert len(names) == 6 and counts**2 / 12.0 < np.var(left) < counts**2 / 8.0
+    assert np.var(left - fitted) < 0.7 * np.var(left)
 
 
-@pytest.mark.parametrize("command", ["step", "parabolic"])
-def test_a_rotor_that_stands_still_is_no_stall(command):
-    exact = recorded(command, noise=SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0)))
-    assert np.all(exact.rotor_angle[:50] == exact.rotor_angle[0])
-    assert not stalled(exact).any() and not stalled(recorded(command)).any()
+@pytest.mark.parametrize("channel", ["angle", "current", "position", "speed"])
+def test_noise_far_above_the_nominal_sensors_is_found(channel):
+    noisy = replace(NOISE, **{channel: 10.0 * getattr(NOISE, channel)})
+    found = estimated_noise([recorded(seed=seed, noise=noisy) for seed in range(2)], NOISE)
+    assert getattr(found, channel) == pytest.approx(10.0 * getattr(NOISE, channel), rel=0.05)
+
+
+def test_the_noise_s_square_does_not_go_along_the_current():
+    """A resistance that depends on the current is a function of its level, times the current: of noise in both, more is
+    left where the level is low."""
+    noisy = replace(NOISE, current=0.05)
+    products = []
+    for seed in range(6):
+        machine = machine_of({"a.nc": recorded("sine", noise=noisy, seed=seed)})
+        off = {n: p.off for n, p in machine.parameters.items()}
+        block = next(b for b in machine.blocks(off, "a.nc") if b.equation == "electrical_a")
+        level = block.coordinates["current"]
+        low = block.usable & (level < np.quantile(level[block.usable], 0.2))
+        products.append(np.mean((block.residual * block.coordinates["drivers"][1])[low]))
+    expected = -ACTUATOR.resistance * 2.0 / 3.0 * noisy.current**2  # of a current less the mean of three
+    assert np.mean(products) == pytest.approx(expected, abs=4.0 * np.std(products) / np.sqrt(len(products)))
