@@ -173,7 +173,6 @@ def factored_set(M, b, constant, fixed, free, mean, sd):
     the posterior's precision in units of the priors, with its transpose above the diagonal, and L^-1 of the gradient at
     the priors' means."""
     n = len(free)
-    found, deviation = mean.copy(), sd.copy()
     base = fixed.copy()
     for k in range(n):
         base[free[k]] = mean[k]
@@ -194,30 +193,43 @@ def factored_set(M, b, constant, fixed, free, mean, sd):
             A[k, m] = M[row, free[m]] * sd[k] * sd[m]
         A[k, k] += 1.0
     if not factored(A):
-        return -np.inf, found, deviation, A, z
+        return -np.inf, mean.copy(), sd.copy(), A, z
     for k in range(n):
         for m in range(k):
             A[m, k] = A[k, m]
-    for k in range(n):  # z = L^-1 of the gradient
+    gain, step, spread, _ = optimum(A, z)
+    return constant + gain, mean + sd * step, sd * spread, A, z
+
+
+@compiled
+def optimum(L, z):
+    """What a Gaussian integral gains from the priors' means to its optimum, with the determinant; the optimum and the
+    standard deviations there in units of the priors, and L^-1.
+
+    L : lower Cholesky factor of the precision in these units; ``z`` the gradient, which becomes L^-1 of it
+    """
+    n = len(z)
+    gain = 0.0
+    for k in range(n):
         x = z[k]
         for q in range(k):
-            x -= A[k, q] * z[q]
-        z[k] = x / A[k, k]
-        constant += 0.5 * z[k] * z[k] - np.log(A[k, k])
+            x -= L[k, q] * z[q]
+        z[k] = x / L[k, k]
+        gain += 0.5 * z[k] * z[k] - np.log(L[k, k])
     inverse = np.zeros((n, n))
     for k in range(n):
         for q in range(k):
-            f = A[k, q]
+            f = L[k, q]
             for m in range(q + 1):
                 inverse[k, m] -= f * inverse[q, m]
         for m in range(k):
-            inverse[k, m] /= A[k, k]
-        inverse[k, k] = 1.0 / A[k, k]
+            inverse[k, m] /= L[k, k]
+        inverse[k, k] = 1.0 / L[k, k]
+    step, spread = np.empty(n), np.empty(n)
     for m in range(n):
-        step, power = 0.0, 0.0
+        best, power = 0.0, 0.0
         for k in range(m, n):
-            step += inverse[k, m] * z[k]
+            best += inverse[k, m] * z[k]
             power += inverse[k, m] * inverse[k, m]
-        found[m] = mean[m] + sd[m] * step
-        deviation[m] = np.sqrt(power) * sd[m]
-    return constant, found, deviation, A, z
+        step[m], spread[m] = best, np.sqrt(power)
+    return gain, step, spread, inverse

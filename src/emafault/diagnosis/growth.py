@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..compiled import compiled
-from .evidence import Reduced, factored, factored_set, sided
+from .evidence import Reduced, factored, factored_set, optimum, sided
 
 
 class Factored:
@@ -25,8 +25,7 @@ class Factored:
         at[free] = mean
         on = np.flatnonzero(at)
         self.gradient = r.b - r.M[:, on] @ at[on]
-        self.step = (self.found - mean) / sd if len(free) else np.zeros(0)
-        self.power = (self.deviation / sd) ** 2 if len(free) else np.zeros(0)
+        self.step, self.power = (self.found - mean) / sd, (self.deviation / sd) ** 2
 
     def log_evidence(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Value, indices, means and standard deviations of the set."""
@@ -119,40 +118,20 @@ def _grown(forward, back, left, z, step, power, gradient, away, sd):
     found, deviation = np.empty(n + e), np.empty(n + e)
     if not factored(S):
         return -np.inf, found, deviation
-    for k in range(e):
-        x = here[k]
-        for q in range(k):
-            x -= S[k, q] * here[q]
-        here[k] = x / S[k, k]
-        gain += 0.5 * here[k] * here[k] - np.log(S[k, k])
-    inverse = np.zeros((e, e))
-    for k in range(e):
-        for q in range(k):
-            f = S[k, q]
-            for m in range(q + 1):
-                inverse[k, m] -= f * inverse[q, m]
-        for m in range(k):
-            inverse[k, m] /= S[k, k]
-        inverse[k, k] = 1.0 / S[k, k]
-    for m in range(e):
-        best, own = 0.0, 0.0
-        for k in range(m, e):
-            best += inverse[k, m] * here[k]
-            own += inverse[k, m] * inverse[k, m]
-        found[n + m] = best
-        deviation[n + m] = np.sqrt(own)
+    more, found[n:], deviation[n:], inverse = optimum(S, here)
+    gain += more
     rows = np.empty(e)
     for k in range(n):
         x = step[k]
         for m in range(e):
             rows[m] = back[m, k] * sd[m]
             x -= rows[m] * found[n + m] + back[m, k] * away[m]
-        more = power[k]
+        wider = power[k]
         for m in range(e):
             f = 0.0
             for q in range(m + 1):
                 f += inverse[m, q] * rows[q]
-            more += f * f
+            wider += f * f
         found[k] = x
-        deviation[k] = np.sqrt(more)
+        deviation[k] = np.sqrt(wider)
     return gain, found, deviation

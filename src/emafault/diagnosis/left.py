@@ -255,6 +255,13 @@ def singly(g: np.ndarray, G: np.ndarray) -> np.ndarray:
     return _less_width(found, 1)
 
 
+def likeliest(values: np.ndarray, tried: np.ndarray) -> tuple[int, float]:
+    """Which of some shapes tried (shape,) has the largest log Bayes factor, and the standard deviation about it."""
+    k = int(np.argmax(values))
+    weight = np.exp(values - values[k])
+    return k, float(np.sqrt(weight @ (tried - tried[k]) ** 2 / weight.sum()))
+
+
 def of_cells(columns: np.ndarray, cells: Scored) -> tuple[np.ndarray, np.ndarray]:
     """Score and information of columns (column, cell) that are constant in each cell, a constant of all apart."""
     shares = columns @ cells.power / max(cells.power.sum(), 1e-300)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from ..compiled import compiled
-from .evidence import Reduced, factored, log_evidence
+from .evidence import Reduced, factored
 from .growth import Factored
 from .model import Unit
 from .set_prior import SIZE_PRIOR, SetPrior
@@ -68,7 +68,7 @@ class Search:
         for m in members:
             if (widths or {}).get(m) is None:
                 best, width = self._widen(members, m, width)
-        value, index, mean, deviation = best or self._factored(members, width).log_evidence()
+        value, index, mean, deviation = best or self.factored(members, width).log_evidence()
         for m in members:
             value += self._paid(m)
             if self.candidates[m].hole.size:
@@ -101,7 +101,9 @@ class Search:
     def wide(self, model: Model) -> Model:
         """The same set under the widest priors, whose estimates are shrunk the least."""
         members = tuple((c.unit, c.variant) for c in model.choices)
-        _, index, mean, deviation = self._evidence(members, {m: self.candidates[m].widths[0] for m in members})
+        _, index, mean, deviation = self.factored(
+            members, {m: self.candidates[m].widths[0] for m in members}
+        ).log_evidence()
         names = self.names[index].tolist()
         return replace(
             model,
@@ -118,7 +120,7 @@ class Search:
     def _widen(self, members, m, width):
         """Evidence at the best width of one member's prior: uphill over its grid from where it is."""
         c = self.candidates[m]
-        others = self._factored(tuple(o for o in members if o != m), width)
+        others = self.factored(tuple(o for o in members if o != m), width)
         more = others.and_one_more(_joined([c.index, c.extra]).astype(int))
 
         def evidence(w):
@@ -163,12 +165,7 @@ class Search:
         """Number of variants of a unit, wherever the point is."""
         return max(1, len(self.units[unit].variants))
 
-    def _evidence(self, members, width):
-        of = self._free(members, width)
-        value, found, deviation = log_evidence(self.reduced, *of)
-        return value, of[0], found, deviation
-
-    def _factored(self, members, width) -> Factored:
+    def factored(self, members, width) -> Factored:
         """A set ready for one member more; the last one is kept, for many are tried in addition to it."""
         key = tuple((m, width[m]) for m in members)
         if self.last is None or self.last[0] != key:

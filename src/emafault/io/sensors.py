@@ -103,8 +103,8 @@ def calm_motion(recording: Recording) -> Recording:
 
 
 def stalled(recording: Recording) -> np.ndarray:
-    """(sample,) bool: where the recorder stood still while the rotor turned: every channel repeats the sample before to
-    the last digit, and the angle then makes up for it."""
+    """(sample,) bool: where the recorder stood still while the rotor turned: voltages, currents and angle repeat the
+    sample before to the last digit, and the angle then makes up for it."""
     channels = (recording.phase_voltage, recording.phase_current, recording.rotor_angle[:, None])
     same = np.append(False, np.all([(np.diff(x, axis=0) == 0.0).all(axis=1) for x in channels], axis=0))
     out, angle, count = np.zeros(len(same), bool), recording.rotor_angle, len(same)

@@ -107,7 +107,7 @@ def _summed(search: Search, model: Model, members: Members, widths: tuple[float,
 def _value(search: Search, members: Members, widths: Sequence[float]) -> float:
     """Log evidence of a set under these widths, their own prior left out."""
     width = dict(zip(members, widths, strict=True))
-    value, index, mean, deviation = search._evidence(members, width)
+    value, index, mean, deviation = search.factored(members, width).log_evidence()
     holes = [m for m in members if search.candidates[m].hole.size]
     return float(value + sum(search._outside(m, width[m], index, mean, deviation) for m in holes))
 

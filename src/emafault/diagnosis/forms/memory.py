@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...first_order import followed
-from ..left import Found, Left, Shape, beside_first, singly
+from ..left import Found, Left, Shape, beside_first, likeliest, singly
 from ..model import Block
 
 AXIS = "what has built up"  # of its picture
@@ -67,10 +67,9 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The time constant."""
     tried = [(int(shape["source"]), float(shape["time_constant"] * f)) for f in FINER]
     values = _values(left, driver, tried)
-    k = int(np.argmax(values))
-    at, weight = tried[k][1], np.exp(values - values[k])
-    spread = float(np.sqrt(weight @ (np.array([c for _, c in tried]) - at) ** 2 / weight.sum())) + 0.05 * at
-    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, spread, "s"))
+    k, spread = likeliest(values, np.array([c for _, c in tried]))
+    at = tried[k][1]
+    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, spread + 0.05 * at, "s"))
     return [Found(found, float(values[k]), float(len(SOURCES) * len(CONSTANTS)))]
 
 

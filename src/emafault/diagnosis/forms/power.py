@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..left import Found, Left, Shape, beside_first, of_cells, singly
+from ..left import Found, Left, Shape, beside_first, likeliest, of_cells, singly
 from ..model import Block
 
 AXIS = "rotor speed (rad/s)"  # of its picture
@@ -50,10 +50,10 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
         return np.vstack([np.ones(len(b.residual)), _powers(np.abs(b.coordinates["rotor_speed"]), tried)])
 
     values = singly(*beside_first(*left.products(of, driver)))
-    k = int(np.argmax(values))
-    weight = np.exp(values - values[k])
-    spread = float(np.sqrt(weight @ (tried - tried[k]) ** 2 / weight.sum())) + 0.02 * tried[k]
-    return [Found((("exponent", float(tried[k]), spread, "1"),), float(values[k]), float(len(EXPONENTS)))]
+    k, spread = likeliest(values, tried)
+    return [
+        Found((("exponent", float(tried[k]), spread + 0.02 * tried[k], "1"),), float(values[k]), float(len(EXPONENTS)))
+    ]
 
 
 def told(values: np.ndarray) -> dict[str, float]:

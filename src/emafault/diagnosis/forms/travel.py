@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...compiled import compiled
-from ..left import Found, Left, Shape, beside_first, singly
+from ..left import Found, Left, Shape, beside_first, likeliest, singly
 from ..model import Block
 
 AXIS = "share that has built up"  # of its picture
@@ -63,10 +63,9 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The length."""
     tried = shape["length"] * FINER
     values = _values(left, driver, tried)
-    k = int(np.argmax(values))
-    weight = np.exp(values - values[k])
-    spread = float(np.sqrt(weight @ (tried - tried[k]) ** 2 / weight.sum())) + 0.05 * float(tried[k])
-    return [Found((("length", float(tried[k]), spread, "rad"),), float(values[k]), float(len(LENGTHS)))]
+    k, spread = likeliest(values, tried)
+    length = float(tried[k])
+    return [Found((("length", length, spread + 0.05 * length, "rad"),), float(values[k]), float(len(LENGTHS)))]
 
 
 def told(values: np.ndarray) -> dict[str, float]:
