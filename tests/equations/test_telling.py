@@ -51,7 +51,7 @@ def test_a_wave_of_the_recorded_angle_moves_the_commutations_of_the_point():
     values = {n: p.off for n, p in one.parameters.items()} | {"controller.commutation_time": 3e-5}
     x = wave[None] / NOISE.angle
     (before,) = [b for b in one.blocks(values, "a.nc", wanted=()) if b.equation == "commutation"]
-    column = one.seen_at(values, "a.nc", x, {})[0]
+    column = one.seen_at(values, "a.nc", "commutation", x, {})[0]
     other = machine_of({"a.nc": recording})
     other.recordings["a.nc"] = one.recordings["a.nc"].less("angle", wave)
     (after,) = [b for b in other.blocks(values, "a.nc", wanted=()) if b.equation == "commutation"]

@@ -98,10 +98,7 @@ class WithForms:
                 here = np.array([values.get(n, 0.0) for n in names])
                 if not here.any() and wanted is not None and not set(names) & set(wanted):
                     continue
-                columns = self.columns(form, block)
-                if columns is None and (form.channel, block.equation) in self.machine.moving:
-                    x = FORMS[form.word].columns(self.machine.sampled(block.recording, form.channel), form.values)
-                    columns = self.machine.seen_at(values, block.recording, x, less)
+                columns = self.columns(form, block, values)
                 if columns is None or not columns.any():
                     continue
                 if form.channel not in less:
@@ -119,8 +116,12 @@ class WithForms:
                 out[form.channel] = out.get(form.channel, 0.0) + x
         return out
 
-    def columns(self, form: Described, block: Block) -> np.ndarray | None:
-        """(column, row) of a form in a block; None where it does not act there."""
+    def columns(self, form: Described, block: Block, values: Mapping[str, float]) -> np.ndarray | None:
+        """(column, row) of a form in a block at a point; None where it does not act there."""
+        if form.channel and (form.channel, block.equation) in self.machine.moving:
+            x = FORMS[form.word].columns(self.machine.sampled(block.recording, form.channel), form.values)
+            less = self._undone(values, block.recording)
+            return self.machine.seen_at(values, block.recording, block.equation, x, less)
         key = block.recording, block.equation, form.id, form.shape
         if key not in self.known:
             if getattr(self.machine, "large", False):  # of one recording at a time
@@ -249,7 +250,7 @@ def refined(
     beside = {n: q for n, q in free.items() if n not in mine}
     acting: dict[str, list[Block]] = {}
     for b in blocks if form.channel else [b for b in blocks if b.equation == form.equation]:
-        if machine.columns(form, b) is not None:
+        if machine.columns(form, b, values) is not None:
             acting.setdefault(b.equation, []).extend(without(machine, form, [b], values))
     if not acting:  # in these recordings
         return form
@@ -305,7 +306,7 @@ def without(machine: WithForms, form: Described, blocks: Sequence[Block], values
     out = []
     for b in blocks:
         here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
-        columns = machine.columns(form, b)
+        columns = machine.columns(form, b, values)
         out.append(b if columns is None else replace(b, residual=b.residual - here @ columns))
     return out
 

@@ -314,9 +314,8 @@ class NormalEquations(Point):
                     moved[p.name] = d
             on.add(unit.id)
         found = self.after(moved)
-        for unit in self.units:
-            if unit.id not in inside:
-                found |= {p.name: p.off for p in unit.parameters}
+        for unit in self.units:  # of another variant of a unit that acts the step has taken out what the point held
+            found |= {p.name: p.off for p in unit.parameters if unit.id not in inside or p.name not in moved}
         self.point |= found
         for unit, p, d in switched:
             self._switch_on(unit, p, d)

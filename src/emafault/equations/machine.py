@@ -40,7 +40,8 @@ class ReferenceActuator:
     """Recordings of one unit of the reference actuator as the diagnosis sees them."""
 
     name = "actuator"
-    moving = (("angle", "commutation"),)  # channel and equation, what shows of one in the other depends on the point
+    #: channel and equation, what shows of one in the other depends on the point
+    moving = (("angle", "commutation"), ("angle", "sensor_speed"))
     bending = ("angle",)  # channels that equations are not linear in
 
     def __init__(
@@ -164,7 +165,7 @@ class ReferenceActuator:
         for block in blocks:
             shown = self._late[name].get(block.equation)
             if shown is None:
-                shown = -self.seen_at(values, name, turned, less)
+                shown = -self.seen_at(values, name, block.equation, turned, less)
             block.columns |= {n: _by_lag(n, values.get(n, 0.0)) @ shown for n in names}
 
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
@@ -203,11 +204,14 @@ class ReferenceActuator:
         return {e: np.array(rows) for e, rows in found.items() if (place, e) not in self.moving}
 
     def seen_at(
-        self, values: Mapping[str, float], name: str, x: np.ndarray, less: Mapping[str, np.ndarray]
+        self, values: Mapping[str, float], name: str, equation: str, x: np.ndarray, less: Mapping[str, np.ndarray]
     ) -> np.ndarray:
-        """(column, row) what signals x (column, sample) on the angle's channel take out of the commutations' residuals;
-        it depends on the point, on where within an interval an edge lies. ``less`` as in ``blocks``."""
+        """(column, row) what signals x (column, sample) on the angle's channel take out of the residuals of one of the
+        equations in which that depends on the point: on what the sensor makes of a speed, or on where within an
+        interval an edge lies. ``less`` as in ``blocks``."""
         state = State(_less(self.recordings[name], less), Point(values, name, ()))
+        if equation == "sensor_speed":
+            return np.array([sensor_speed.of_angle(state, row) for row in x])
         rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
         return self.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
 

@@ -88,5 +88,6 @@ class State:
         for name in ("current", "k", "conducting"):
             setattr(out, name, [Dual(x.value) for x in getattr(self, name)])
         out.rec = copy(self.rec)
-        out.rec.inertia_scale, out.rec.play = Dual(self.rec.inertia_scale.value), Dual(self.rec.play.value)
+        for name in ("inertia_scale", "play", "ahead"):
+            setattr(out.rec, name, Dual(getattr(self.rec, name).value))
         return out

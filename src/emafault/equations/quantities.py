@@ -21,6 +21,7 @@ def fill(state: State) -> None:
     scale = _product(state, "inertia")
     rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
     rec.play = _sum(state, "play")
+    rec.ahead = _sum(state, "angle") + p.own("zero")
     state.current, state.current_end = true_currents(rec, p)
     _angles(state)
     _coefficients(state)
@@ -44,7 +45,7 @@ def _sum(state: State, hook: str, *args):
 def _angles(state: State) -> None:
     """Mean of f over each interval, swept and over its conducting part; both with derivatives by offset and ramp."""
     rec = state.rec
-    shift, ramp = _sum(state, "angle") + state.p.own("zero"), _sum(state, "ramp")
+    shift, ramp = rec.ahead, _sum(state, "ramp")
     poles = rec.actuator.pole_pairs
     state.swept, state.regressor, state.conducting = [], [], []
     per = 1.0 / (poles * rec.interval)

@@ -37,12 +37,23 @@ def seen_speed(state: State, w: Dual) -> Dual:
     return w
 
 
+def of_angle(state: State, x: np.ndarray) -> np.ndarray:
+    """(sample,) what the sensor makes (rad/s) of the rate of a part x (rad) of the angle."""
+    rate = np.diff(x, prepend=x[:1]) / state.rec.interval
+    with_it, without = (
+        recorded_late(state.p, "speed", seen_speed(state, Dual(r)), state.rec.size).value for r in (rate, 0.0 * rate)
+    )
+    return np.asarray(with_it) - np.asarray(without)
+
+
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((rad/s)2): what the sensor makes of the angle's noise, too."""
     rec = state.rec
     of_angle = np.array([1.0, -1.0])
     for m in with_hook("response"):
         of_angle = np.convolve(of_angle, m.response(state.p.of(effect_name(m)), rec))
+    early = float(state.p("lag.speed_early").value)
+    of_angle = np.convolve(of_angle, [early, 1.0 - early])
     angle = (rec.noise.angle / rec.interval) ** 2 * np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
     rounded = (0.5 * rec.speed_step) ** 2  # next to a change
     white = rec.noise.speed**2 + rounded

@@ -114,6 +114,7 @@ class Signals:
         self.dT: Any = self.dT_measured
         self.inertia_scale: Any = Dual(1.0)
         self.play: Any = Dual(self.actuator.backlash)
+        self.ahead: Any = Dual(0.0)  # electrical rad, by which the recorded angle is
 
     def _start_angle(self) -> float:
         moved = np.flatnonzero(np.abs(self.angle - self.angle[0]) > REST)

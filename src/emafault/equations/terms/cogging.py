@@ -11,7 +11,7 @@ def torque(p, rec):
     a = p("a")
     if not (a.value or a.slopes):
         return a
-    return a * (np.sin(ORDER * rec.middle) * np.sinc(ORDER * rec.half_sweep / np.pi))
+    return a * _of_true_angle(rec, rec.middle, np.sinc(ORDER * rec.half_sweep / np.pi), 0.0)
 
 
 def between(p, rec):
@@ -25,9 +25,16 @@ def between(p, rec):
         return a
     before = 2.0 * ORDER * rec.half_sweep
     after = np.append(before[1:], before[-1])
-    x = ORDER * rec.angle
     even = 0.5 * (np.sinc(before / (2.0 * np.pi)) ** 2 + np.sinc(after / (2.0 * np.pi)) ** 2)
-    return a * (even * np.sin(x) + (_odd(after) - _odd(before)) * np.cos(x))
+    return a * _of_true_angle(rec, rec.angle, even, _odd(after) - _odd(before))
+
+
+def _of_true_angle(rec, recorded, even, odd):
+    """even sin(x) + odd cos(x) of the wave's phase x, which is that of the rotor, not of its recorded angle."""
+    per = ORDER / rec.actuator.pole_pairs
+    x = ORDER * recorded - per * float(rec.ahead.value)
+    sin, cos = np.sin(x), np.cos(x)
+    return rec.ahead.through(even * sin + odd * cos, per * (odd * sin - even * cos))
 
 
 def _odd(d):
