@@ -83,11 +83,14 @@ class State:
 
     def at(self, point: Point) -> "State":
         """The same quantities without their derivatives, for terms at another point."""
+        from . import quantities
+
         out = copy(self)
         out.p = point
         for name in ("current", "k", "conducting"):
             setattr(out, name, [Dual(x.value) for x in getattr(self, name)])
         out.rec = copy(self.rec)
-        for name in ("inertia_scale", "play", "ahead"):
+        for name in ("inertia_scale", "play", "ahead", "load", "spring"):
             setattr(out.rec, name, Dual(getattr(self.rec, name).value))
+        out.rec.flexible = quantities.flexible(out)
         return out

@@ -22,10 +22,17 @@ def fill(state: State) -> None:
     rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
     rec.play = _sum(state, "play")
     rec.ahead = _sum(state, "angle") + p.own("zero")
+    rec.load, rec.spring = _sum(state, "load"), _sum(state, "spring")
+    rec.flexible = flexible(state)
     state.current, state.current_end = true_currents(rec, p)
     _angles(state)
     _coefficients(state)
     _resistances(state)
+
+
+def flexible(state: State) -> bool:
+    """Whether the user shaft is driven through a flexibility."""
+    return any(m.is_flexible(state.p.of(effect_name(m)), state.rec) for m in with_hook("is_flexible"))
 
 
 def _product(state: State, hook: str, *args):

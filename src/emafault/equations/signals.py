@@ -114,6 +114,9 @@ class Signals:
         self.dT: Any = self.dT_measured
         self.inertia_scale: Any = Dual(1.0)
         self.play: Any = Dual(self.actuator.backlash)
+        self.load: Any = Dual(0.0)
+        self.spring: Any = Dual(0.0)
+        self.flexible = False  # whether these act on the motor through the shaft's torque alone
         self.ahead: Any = Dual(0.0)  # electrical rad, by which the recorded angle is
 
     def _start_angle(self) -> float:

@@ -15,18 +15,20 @@ STIFFEST = 2e-5  # rad/(N m), of the reference actuator
 KEPT = 12  # solutions of a recording
 
 
-def solve(rec, flexibility, damping, play, inertia):
+def solve(rec, flexibility, damping, play, inertia, load, spring):
     """User angle (rad) and torque on the motor (N m) along the measured rotor angle.
 
-    ``inertia``: factor of this unit's, which the user shaft has its share of.
+    ``inertia``: factor of this unit's, which the user shaft has its share of; ``load`` (N m) and ``spring`` (N m/rad)
+    act on the user shaft.
     """
     a = rec.actuator
     if flexibility < _stiffest(rec):
         return None
     J = SHARE * inertia * a.inertia * a.gear_ratio**2
     position, torque = flexible_shaft(
-        rec.once(("quiet",), rec.quiet) / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play
-    )
+        rec.once(("quiet",), rec.quiet) / a.gear_ratio, rec.interval, 1.0 / flexibility, damping, J, GROUND, play,
+        load, spring,
+    )  # fmt: skip
     return position, torque / a.gear_ratio
 
 
@@ -35,9 +37,14 @@ def _stiffest(rec):
     return scale("shaft_flexibility", rec.actuator) * STIFFEST
 
 
+def is_flexible(p, rec):
+    """Whether a load acts on the motor through the shaft's torque alone."""
+    return p("flexibility").value >= _stiffest(rec)
+
+
 def rotor_share(p, rec):
     """Share of the inertia that turns with the rotor."""
-    return 1.0 - SHARE if p("flexibility").value >= _stiffest(rec) else 1.0
+    return 1.0 - SHARE if is_flexible(p, rec) else 1.0
 
 
 def twist(p, rec, rigid):
@@ -51,7 +58,7 @@ def torque(p, rec):
 
 
 def _dual(p, rec, which, rigid):
-    parameters = p("flexibility"), p("C"), rec.play, rec.inertia_scale
+    parameters = p("flexibility"), p("C"), rec.play, rec.inertia_scale, rec.load, rec.spring
     given = tuple(float(x.value) for x in parameters)
     flexibility = parameters[0]
     base = _solved(rec, *given)
@@ -59,7 +66,15 @@ def _dual(p, rec, which, rigid):
         return rigid if rigid is not None else flexibility.through(0.0, 0.0)
     out = flexibility.through(np.asarray(base[which]), 0.0)
     own = rec.actuator
-    steps = 1e-6 * scale(SCALES["flexibility"], own), 5.0 * scale(SCALES["C"], own), 0.02 * own.backlash, 0.01
+    of_torque = scale(SCALES["C"], own)
+    steps = (
+        1e-6 * scale(SCALES["flexibility"], own),
+        5.0 * of_torque,
+        0.02 * own.backlash,
+        0.01,
+        0.1 * of_torque,
+        of_torque,
+    )
     for m, (parameter, step) in enumerate(zip(parameters, steps, strict=True)):
         if parameter.slopes and step > 0.0:
             there = _solved(rec, *(x + step if k == m else x for k, x in enumerate(given)))
