@@ -206,12 +206,13 @@ def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual |
     return out
 
 
-def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
-    """Mean and end currents (A) of each phase from the recorded ones: lag, curve, crosstalk, drift, then offset
-    and gain."""
+def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[Dual]]:
+    """Mean and end currents (A) of each phase from the recorded ones, less lag, curve, crosstalk and drift, then less
+    offset and gain of the sensors; and mean currents that these show, as the regulator sees them."""
     rounding = _rounding(rec, p)
     means: list[Dual] = []
     ends: list[Dual] = []
+    shown: list[Dual] = []
     at_end = rec.current_end
     if at_end is None:
         following = np.vstack([rec.current[1:], rec.current[-1:]])
@@ -227,11 +228,14 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual]]:
             for q in range(3):
                 if q != j:
                     i = i - p(f"crosstalk_current.{'abc'[j]}{'abc'[q]}") * source[:, q]
+            i = i / gain_of_its_own(p, "current", "abc"[j], rec)
+            if out is means:
+                shown.append(i)
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
-            out.append(i / gain_of_its_own(p, "current", "abc"[j], rec))
+            out.append(i)
         # the true ones add up to nothing: what the three say together is less noisy than each alone
         mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
         for j in range(3):
             out[j] = out[j] - mean
-    return means, ends
+    return means, ends, shown

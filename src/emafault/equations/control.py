@@ -37,7 +37,7 @@ def residual(state: State) -> Dual:
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged, over
     # a span that takes out the noise and leaves the sensor's own dynamics
     shaft = position.shaft_angle(state)
-    output = shaft + (rec.output - shaft).linear(lambda x: _averaged(x, h), rec.size)
+    output = shaft + position.residual(state).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
     span = _speed_span(state)
     beyond = (_calmed(rec.speed_recorded, h) - model).linear(
@@ -124,7 +124,7 @@ def _sensors_show(state: State) -> Dual:
     rec = state.rec
     out = Dual(0.0)
     for j, on in enumerate(rec.once(("counted",), lambda: [_counted(rec, phase) for phase in range(3)])):
-        out = out + (rec.current[:, j] - state.current[j]) * (0.5 * on)
+        out = out + (state.shown[j] - state.current[j]) * (0.5 * on)
     return out
 
 
