@@ -133,6 +133,30 @@ def test_one_of_variants_that_look_alike_near_off_is_the_best_at_its_own_optimum
     assert bench.point["c"] == 0.0 and bench.point["d"] == pytest.approx(0.5, abs=0.1)
 
 
+def test_a_step_takes_out_what_the_point_holds_of_another_variant():
+    """The linear model has it off; left where it was, both would act."""
+
+    class Variants(Machine):
+        a, c, d = (Parameter(n, 0.0, 0.0, 1.0) for n in "acd")
+        parameters = {"a": a, "c": c, "d": d}  # noqa: RUF012
+        units = (Unit("u", "form", ("torque",), [Variant([c]), Variant([d])]),)
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other, more = np.random.default_rng(4).standard_normal((4, ROWS))
+            columns = {"a": one, "c": other, "d": other + 0.2 * more}
+            residual = noise + values["a"] * one + values["c"] * other + (values["d"] - 0.5) * columns["d"]
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    bench = Bench(Variants(), ["r"])
+    bench.settle(Model((Choice("u", 0, 1.0),)))
+    assert bench.point["c"] > 0.4
+    both = Model((Choice("u", 0, 1.0), Choice("u", 1, 1.0)))
+    normal = bench.normal(bench.linearise(both, corrected=False), both)
+    reduced = bench.reduce(normal)
+    bench.move(bench.searching(reduced, *bench.candidates(reduced)).fit((("u", 1),)), normal)
+    assert bench.point["c"] == 0.0 and bench.point["d"] == pytest.approx(0.5, abs=0.1)
+
+
 def test_a_unit_at_the_end_of_its_tolerance_is_within_reach():
     """0.61 is within four tolerances of 10 %, though its logarithm is 4.9 of them from that of 1."""
 

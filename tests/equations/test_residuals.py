@@ -123,6 +123,23 @@ def test_the_controller_saw_the_recorded_speed_whatever_dynamics_it_has(command)
     assert found["control"] < 1.3
 
 
+RECORDER = {
+    "lag of the output": ({"place": "output", "form": "lag", "lag": 0.6}, {"lag.output_late": 0.6}),
+    "drift of a current": (
+        {"place": "current_a", "form": "drift", "at_start": 0.03, "at_end": 0.06},
+        {"offset_current.a@a.nc": 0.03, "drift_current.a@a.nc": 0.03},
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", RECORDER)
+def test_the_controller_does_not_see_what_a_recorder_makes_of_a_signal(fault):
+    entry, values = RECORDER[fault]
+    recording = recorded("reversal", unlisted=(entry,))
+    machine = machine_of({"a.nc": recording})
+    assert mean_squares(machine, truth(machine, recording) | values)["control"] < 1.3
+
+
 def test_what_a_point_takes_off_the_angle_leaves_the_noise_as_it_is():
     """An error that is allowed to be larger or smaller would have a likelihood of its own, whatever it is."""
     recording = recorded("reversal", effects={"speed_latency": {"tau": 3e-4}})
@@ -247,6 +264,21 @@ def test_each_effect_shows_in_its_equation_and_is_white_at_its_value(effect):
     # a delay shows in the few rows at the reversals alone
     on, off = (mean_squares(machine, truth(machine, recording, e, fault), ()) for e in ({effect: given}, {}))
     assert rows * (off[equation] - on[equation]) > 10.0
+
+
+def test_cogging_goes_along_the_angle_of_the_rotor_and_not_the_recorded_one():
+    given = {"cogging": {"a": 0.01}, "angle_offset": {"offset": 4.0}}
+    recording = recorded("sine", effects=given, settings={"amplitude": 0.004, "frequency": 5.0})
+    machine = machine_of({"a.nc": recording})
+    at = truth(machine, recording, given)
+    assert mean_squares(machine, at)["torque"] < 1.2
+    # of the offset, too: 72 periods a turn
+    one, other = (
+        next(b for b in machine.blocks(at | {"angle_offset.offset": x}, "a.nc") if b.equation == "torque")
+        for x in (4.0, 4.01)
+    )
+    moved, column = (other.residual - one.residual) / 0.01, one.columns["angle_offset.offset"]
+    assert moved @ column / (column @ column) == pytest.approx(1.0, abs=0.02)
 
 
 def test_cogging_is_as_large_where_an_interval_sweeps_a_period_of_it():

@@ -30,8 +30,10 @@ CASES = {
     "fields take up power": ("bus", "step", 2e-4, {"bus_resistance": {"R": 0.5}}),
     "contact while the shaft moves": ("torque", "sine", 5e-5, FLEXIBLE),
     "flexible behind this unit's play": ("torque", "sine", 5e-5, FLEXIBLE | {"backlash": {"blk": 4e-4}}),
+    "a load moves a flexible shaft": ("position", "reversal", 2e-4, FLEXIBLE | {"load_constant": {"T": 6.0}}),
+    "a spring acts on the motor through it": ("torque", "sine", 1e-4, FLEXIBLE | SPRING),
     "a spring behind this unit's play": ("torque", "sine", 1e-4, SPRING | {"backlash": {"blk": 9e-4}}),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -209,3 +211,33 @@ def test_a_filter_of_the_speed_filters_the_noise_of_the_angle(tau):
     rows = len(left)
     assert np.mean(left**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / rows))
     assert all(abs(left[k:] @ left[:-k]) / rows < 4.0 / np.sqrt(rows) for k in (1, 2, 3))
+
+
+@pytest.mark.parametrize("tau", [0.0, 6e-4])
+def test_the_lag_of_an_angle_shows_in_the_speed_as_the_sensor_makes_it(tau):
+    recording = recorded("sine", effects={"speed_latency": {"tau": tau}})
+    machine = machine_of({"a.nc": recording})
+    at = truth(machine, recording, {"speed_latency": {"tau": tau}})
+
+    def of_speed(lag):
+        blocks = machine.blocks(at | {"lag.angle_late": lag}, "a.nc", wanted={"lag.angle_late"})
+        return next(b for b in blocks if b.equation == "sensor_speed")
+
+    column, (low, high) = of_speed(0.05).columns["lag.angle_late"], (of_speed(x) for x in (0.04, 0.06))
+    moved = (high.residual - low.residual) / 0.02
+    inside = slice(20, -20)
+    # the column is of a smoothed angle, whose noise is not that of the residual
+    assert moved[inside] @ column[inside] / (column[inside] @ column[inside]) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("tau, early", [(0.0, 0.4), (3e-4, 0.3)])
+def test_what_makes_a_speed_early_makes_the_angle_s_noise_another(tau, early):
+    machine = machine_of({"a.nc": recorded("parabolic", interval=1e-4)})
+    at = {n: p.off for n, p in machine.parameters.items()}
+    at |= {"speed_latency.tau": tau, "lag.speed_early": early}
+    one, other = (
+        next(b for b in machine.blocks(at, "a.nc", disturbed, ()) if b.equation == "sensor_speed")
+        for disturbed in (False, True)
+    )
+    noise = whiten(one.bands, one.usable, (other.residual - one.residual)[:, None])[one.usable]
+    assert np.mean(noise**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(noise)))

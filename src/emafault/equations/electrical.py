@@ -64,7 +64,7 @@ def _difference(x: np.ndarray) -> np.ndarray:
 def residuals(state: State) -> dict[str, Dual]:
     """Recorded less predicted voltage (V) of each phase."""
     rec = state.rec
-    true = recorded(state, [_late(state, v, rise) for v, rise in zip(voltages(state), state.rise, strict=True)])
+    true = recorded(state, [v + rise for v, rise in zip(voltages(state), state.rise, strict=True)])
     out = {}
     for j, name in enumerate(NAMES):
         residual = rec.voltage[:, j] - true[j] - drifted(state.p, "voltage", "abc"[j], rec)
@@ -75,22 +75,10 @@ def residuals(state: State) -> dict[str, Dual]:
     return out
 
 
-def _late(state: State, voltage: Dual, rise: Dual) -> Dual:
-    """Voltage and that of the inductance as a channel that lags has them.
-
-    Without end currents its derivatives by a lag leave the inductance's out: to the ripple that ends are off by, which
-    a lag averages and the residual has as well, the true change of slope between a run's ends is nothing.
-    """
-    size = state.rec.size
-    seen = recorded_late(state.p, "voltage", voltage + rise, size)
-    if state.rec.current_end is None:
-        seen = Dual(seen.value, seen.slopes | recorded_late(state.p, "voltage", Dual(voltage.value), size).slopes)
-    return seen
-
-
 def recorded(state: State, true: list[Dual]) -> list[Dual]:
-    """What is recorded of voltages as a channel has them: gains, star point, curves, the switches' drop."""
+    """What is recorded of the true voltages: lag, gains, the star point, the channels' curves, the switches' drop."""
     p, rec, a = state.p, state.rec, state.rec.actuator
+    true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
     true = [v * gain_of_its_own(p, "voltage", j, state.rec) for j, v in zip("abc", true, strict=True)]
