@@ -205,14 +205,18 @@ class Bench(Settling):
                 if m[0] not in best or single.log_posterior > best[m[0]].log_posterior:
                     best[m[0]] = single
         singles = sorted(best.values(), key=lambda m: -m.log_posterior)[:SINGLES]
-        begun = self.here()
+        begun, proposed = self.here(), self.described
         ends = []
         for model in [leading, *singles]:
             self.go_to(begun)
             found = self.settle(model, normal)
-            ends.append((found.log_posterior, self.here()))
-        value, place = max(ends, key=lambda e: e[0])
+            if self._refine(found):  # its shape was found beside whatever else might explain it
+                found = self.settle(found)
+            ends.append((found.log_posterior, self.here(), self.described))
+            self.describe(proposed)
+        value, place, shaped = max(ends, key=lambda e: e[0])
         better = value > ends[0][0]
+        self.describe(shaped if better else proposed)
         self.go_to(place if better else begun)
         return better
 
