@@ -11,6 +11,7 @@ from .recording import Recording
 
 SAME_CONDITION = 2.0  # K
 MOST = 4000  # splits that are looked at: all of them where there are no more, else those that exchanges lead to
+TURN, PARTS = 2.0 * np.pi, 36  # rad of the rotor, and what it is looked at in
 STARTS = (0.5, 0.0, 0.75, 0.25, 0.9, 0.1, 0.6, 0.4)  # share of the step at which an even choice begins
 
 #: what a choice of recordings to confirm lacks, given their places in order of name; None where it is not allowed
@@ -137,11 +138,16 @@ def _reach(recording: Recording) -> list[float]:
     return [max(float(np.quantile(np.abs(x), 0.99)), 1e-9) for x in signals]
 
 
+def _passed(recording: Recording) -> np.ndarray:
+    """(part,) bool: parts of its turn that the rotor is in at any time."""
+    return np.bincount((np.mod(recording.rotor_angle, TURN) / TURN * PARTS).astype(int) % PARTS, minlength=PARTS) > 0
+
+
 def _lack(recordings: Sequence[Recording], number: int) -> Lack:
     """What a split lacks, as a function of the recordings that confirm.
 
-    Range of temperature, current, speed, commands and directions in explore, spread and kinds in confirm, and
-    recordings that confirm, of which ``number`` are wanted.
+    Range of temperature, current, speed, commands and directions in explore, spread and kinds in confirm, angles of the
+    rotor in both, and recordings that confirm, of which ``number`` are wanted.
     """
     count = len(recordings)
     ambient = np.array([r.ambient_temperature for r in recordings])
@@ -151,6 +157,7 @@ def _lack(recordings: Sequence[Recording], number: int) -> Lack:
     reach = np.array([_reach(r) for r in recordings])
     duration = [float(r.time[-1]) for r in recordings]
     largest, total = reach.max(axis=0), sum(duration)
+    passed = np.array([_passed(r) for r in recordings])
     width = max(float(np.ptp(ambient)), 1.0)
 
     def lack(confirm: tuple[int, ...]) -> float | None:
@@ -176,6 +183,10 @@ def _lack(recordings: Sequence[Recording], number: int) -> Lack:
         cost += 0.5 * (1.0 - len(set(asked)) / len(confirm))
         # what shows at large currents or high speeds alone must be there to be fitted
         cost += float(np.sum(1.0 - reach[explore].max(axis=0) / largest))
+        # of what sits at an angle a recording that does not pass it says nothing
+        cost += sum(
+            1.0 - float(passed[side].any(axis=0).sum()) / passed.any(axis=0).sum() for side in (explore, chosen)
+        )
         every = set(healths)
         cost += 0.5 * sum(h not in {healths[k] for k in confirm} for h in every) / len(every)
         # after a step an actuator hunts, and how it does proves little: neither side is made of such recordings alone
