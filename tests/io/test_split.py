@@ -121,3 +121,18 @@ def test_a_long_bench_is_split_at_once_the_same_in_any_order(shop, monkeypatch):
     ambient = {n: r.ambient_temperature for n, r in bench.items()}
     assert np.ptp([ambient[n] for n in explore]) > 0.98 * np.ptp(list(ambient.values()))
     assert np.ptp([ambient[n] for n in confirm]) > 0.5 * np.ptp(list(ambient.values()))
+
+
+def test_a_motion_that_passes_few_angles_does_not_confirm_alone(shop):
+    """Of what sits at an angle of the rotor it could not say whether it is there."""
+    small, far = (("sine", {"amplitude": x, "frequency": 2.0}) for x in (0.002, 0.02))
+    plans = [(*small, 20.0, "unknown"), *((*far, ambient, "unknown") for ambient in (0.0, 23.0, 40.0))]
+    bench = shop.make_bench(plans=plans, duration=0.3, interval=1e-3)
+    few = min(bench, key=lambda n: np.ptp(bench[n].rotor_angle))
+    assert (
+        np.ptp(bench[few].rotor_angle)
+        < 3.0
+        < 2.0 * np.pi
+        < min(np.ptp(r.rotor_angle) for n, r in bench.items() if n != few)
+    )
+    assert few not in split_bench(bench)[1]
