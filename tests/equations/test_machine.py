@@ -106,3 +106,22 @@ def test_normal_matrices_are_the_same_in_any_number_of_processes():
         bench.point["unit_calibration.k_scale"] *= 1.01
         found.append(bench.linearise(renew=True))
     assert all(np.array_equal(a.gram, b.gram) for a, b in zip(*found, strict=True))
+
+
+def test_a_large_drag_of_some_power_is_that_and_no_sum_of_other_frictions():
+    """Beside whatever else might explain it a scan cannot tell the exponent; by itself it is told."""
+    fan = {"place": "drag", "form": "power", "exponent": 2.0, "at_100_rad_s": 0.04}
+    motions = {
+        "reversal": {"amplitude": 0.056, "speed": 0.45},
+        "sine": {"amplitude": 0.013, "frequency": 4.0},
+        "parabolic": {"acceleration": 0.37},
+    }
+    recordings = {
+        f"{command}.nc": recorded(command, settings=settings, seed=n, theta_0=0.5 * n, unlisted=(fan,))
+        for n, (command, settings) in enumerate(motions.items())
+    }
+    bench = Bench(machine_of(recordings), list(recordings))
+    leading = bench.fit().models[0]
+    (form,) = [f for f in bench.described if f.id in leading.units]
+    assert len(leading.units) == 1 and form.word == "power"
+    assert form.values["exponent"] == pytest.approx(2.0, abs=0.05)
