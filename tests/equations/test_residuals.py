@@ -404,3 +404,17 @@ def test_a_healthy_recording_has_nothing_of_what_seeded_ones_share():
     off = {n: p.off for n, p in machine.parameters.items()}
     for x, y in zip(machine.blocks(off, "a.nc"), machine.blocks(off | {"seeded.Na": 0.2}, "a.nc"), strict=True):
         assert np.array_equal(x.residual, y.residual), x.equation
+
+
+@pytest.mark.parametrize("w_s", [8.0, 150.0])
+def test_a_stribeck_friction_acts_with_the_speed_that_is_told(w_s):
+    machine = machine_of({"a.nc": recorded("sine")})
+    at = {n: p.off for n, p in machine.parameters.items()} | {"stribeck.a": 0.02}
+
+    def of_torque(log_w_s):
+        blocks = machine.blocks(at | {"stribeck.log_w_s": log_w_s}, "a.nc", wanted={"stribeck.log_w_s"})
+        return next(b for b in blocks if b.equation == "torque")
+
+    here, ahead, back = (of_torque(np.log(w_s) + x) for x in (0.0, 0.01, -0.01))
+    moved, column = (ahead.residual - back.residual) / 0.02, here.columns["stribeck.log_w_s"]
+    assert moved @ column / (column @ column) == pytest.approx(1.0, abs=0.01)

@@ -5,6 +5,7 @@ import numpy as np
 SENTENCE = "the friction falls with speed (Stribeck)"
 PARAMETERS = {"a": (0.0, 0.0, 0.018), "log_w_s": (1.8, 1.8, 0.7)}
 SCALES = {"a": "motor_torque"}
+ENDS = (-4.0, 8.0)  # of log_w_s, beyond which the function stays what it is there
 SHAPES = ({"a": 0.01, "log_w_s": 0.9}, {"a": 0.01, "log_w_s": 1.8}, {"a": 0.01, "log_w_s": 2.7})
 
 
@@ -13,9 +14,10 @@ def torque(p, rec):
     a, log_w_s = p("a"), p("log_w_s")
     if not (a.value or a.slopes or log_w_s.slopes):
         return a
-    x = np.abs(rec.speed) / np.exp(np.clip(log_w_s.value, -1.0, 4.0))
+    at = float(np.clip(log_w_s.value, *ENDS))
+    x = np.abs(rec.speed) / np.exp(at)
     value = rec.direction * np.exp(-x)
-    return a * value + log_w_s.through(0.0, a.value * value * x)
+    return a * value + log_w_s.through(0.0, a.value * value * x * (at == log_w_s.value))
 
 
 def report(value, deviation):
