@@ -23,6 +23,7 @@ from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import seen, told
 from .signals import Signals, estimated_noise
+from .unconfirmed import unconfirmed
 from .verdict import Fitted, verdict_of
 
 ENOUGH = 50_000  # samples that a search begins with; what it leads to is fitted to all
@@ -128,7 +129,8 @@ def diagnose(
     quality = {n: quality[n] if n in quality else seen(r) for n, r in recordings.items()}
     final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders)
     fitted = Fitted(whole, every, all_fit, final, held_out)
-    return Diagnosed.of(fitted, verdict_of(name, split, fitted, sealed, recordings, quality), own)
+    verdict = verdict_of(name, split, fitted, sealed, recordings, quality)
+    return Diagnosed.of(fitted, verdict | {"warnings": unconfirmed(fitted)}, own)
 
 
 def _seal(reading: Reading) -> dict[str, Any]:

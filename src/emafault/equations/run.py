@@ -26,6 +26,7 @@ from .probabilities import checked_on
 from .sentences import finding
 
 PROCESSES = 2
+SAID = ("unconfirmed", "set aside", "samples")  # kinds of warnings that the command says: what was not told, or taken
 
 
 def diagnose_folder(
@@ -64,7 +65,7 @@ def diagnose_folder(
     if corrected is not None:
         new_folder(path, corrected, "--corrected")
     bench = read_within(path, spec, samples)
-    if corrected is not None and (message := _left_out(bench)):
+    if corrected is not None and (message := _warned(bench.warnings, "samples")):
         raise InputError(f"--corrected: {message[0]}, accepted is as many as there are")
     found = diagnosed(bench, spec, exclude, calibration)
     verdict = found.verdict
@@ -98,13 +99,14 @@ def diagnosed(
     InputError : recordings or effects that cannot be used
     """
     found = diagnose_bench(bench, spec, exclude, calibration)
-    print("\n".join([*finding(found.verdict), *_left_out(bench, "set aside"), *_left_out(bench)]), flush=True)
+    said = [m for kind in SAID for m in _warned(found.verdict["warnings"], kind)]
+    print("\n".join([*finding(found.verdict), *said]), flush=True)
     return found
 
 
-def _left_out(bench: Bench, kind: str = "samples") -> list[str]:
-    """What of a bench a diagnosis does not take, for there are enough or, ``set aside``, for it is of no use."""
-    return [w["message"] for w in bench.warnings if w["kind"] == kind]
+def _warned(warnings: Sequence[Mapping[str, Any]], kind: str) -> list[str]:
+    """Messages of warnings of a kind."""
+    return [w["message"] for w in warnings if w["kind"] == kind]
 
 
 def diagnose_bench(
@@ -126,7 +128,7 @@ def diagnose_bench(
     checked_by = checked_on(actuator, calibration)  # before the work, not after it
     split = split_bench(bench.recordings)
     found = diagnose(bench.name, bench.recordings, split, actuator, noise, exclude, PROCESSES, spec["tolerances"])
-    found.verdict["warnings"] = bench.warnings
+    found.verdict["warnings"] = [*bench.warnings, *found.verdict["warnings"]]
     found.verdict["calibration"] = checked_by
     return found
 
