@@ -125,6 +125,8 @@ def test_the_controller_saw_the_recorded_speed_whatever_dynamics_it_has(command)
 
 RECORDER = {
     "lag of the output": ({"place": "output", "form": "lag", "lag": 0.6}, {"lag.output_late": 0.6}),
+    "lag of the currents": ({"place": "current", "form": "lag", "lag": 0.5}, {"lag.current_late": 0.5}),
+    "filter of the currents": ({"place": "current", "form": "low_pass", "delay": 0.3}, {"lag.current_filtered": 0.3}),
     "drift of a current": (
         {"place": "current_a", "form": "drift", "at_start": 0.03, "at_end": 0.06},
         {"offset_current.a@a.nc": 0.03, "drift_current.a@a.nc": 0.03},

@@ -72,6 +72,12 @@ def _changed(x: Dual, operate: Callable[[np.ndarray], np.ndarray], lag: Dual, si
     return x.linear(operate, size) if lag.value else Dual(x.value).linear(operate, size)
 
 
+def late_by(p: Point, channel: str) -> Dual:
+    """By how many intervals what changes slowly is recorded late on a channel that lags, smooths or filters."""
+    late, early, smooth, constant = (p(f"lag.{channel}_{of}") for of in ("late", "early", "smoothed", "filtered"))
+    return late - early + smooth + constant
+
+
 def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray) -> Dual:
     """The true signal from one recorded on a channel that lags, smooths or filters.
 
@@ -206,13 +212,15 @@ def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual |
     return out
 
 
-def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[Dual]]:
+def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[Dual], list[Dual]]:
     """Mean and end currents (A) of each phase from the recorded ones, less lag, curve, crosstalk and drift, then less
-    offset and gain of the sensors; and mean currents that these show, as the regulator sees them."""
+    offset and gain of the sensors; mean currents that these show, as the regulator sees them; and what the recorded
+    ones are beyond those on time."""
     rounding = _rounding(rec, p)
     means: list[Dual] = []
     ends: list[Dual] = []
     shown: list[Dual] = []
+    lag: list[Dual] = []
     at_end = rec.current_end
     if at_end is None:
         following = np.vstack([rec.current[1:], rec.current[-1:]])
@@ -220,8 +228,8 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[
     rate = [rates(rec.current[:, j], None if rec.current_end is None else rec.current_end[:, j]) for j in range(3)]
     for n, (source, out) in enumerate(((rec.current, means), (at_end, ends))):
         for j in range(3):
-            i = undone(p, "current", source[:, j], rate[j][n])
-            i = i + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
+            on_time = undone(p, "current", source[:, j], rate[j][n])
+            i = on_time + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
             i = i - drifted(p, "current", "abc"[j], rec)
             if out is means and rounding is not None:
                 i = i - rounding * np.sign(rec.rows_from.current[:, j])
@@ -231,6 +239,7 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[
             i = i / gain_of_its_own(p, "current", "abc"[j], rec)
             if out is means:
                 shown.append(i)
+                lag.append(source[:, j] - on_time)
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
             out.append(i)
@@ -238,4 +247,4 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[
         mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
         for j in range(3):
             out[j] = out[j] - mean
-    return means, ends, shown
+    return means, ends, shown, lag

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.commands import with_corners
 from ..first_order import filtered
 from . import commutation, position
-from .acquisition import through
+from .acquisition import late_by, through
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -62,7 +62,7 @@ def residual(state: State) -> Dual:
     gain = p("controller.speed_gain")
     # solved for the speed's error, which the noise lies on: a smaller gain must not make the noise smaller
     asked_for = error + p("controller.speed_integral_gain") / gain * integral
-    late: Dual | float = p(f"controller.timing@{rec.name}")
+    late: Dual | float = p(f"controller.timing@{rec.name}") + h * late_by(p, "current")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
@@ -111,9 +111,11 @@ def _least_risk(rec) -> int:
 
 
 def _true_level(state: State) -> Dual:
-    """(sample,) half the sum of the absolute phase currents (A)."""
+    """(sample,) half the sum of the absolute phase currents (A), as late as they are recorded: what undoes a lag
+    amplifies noise."""
     out = Dual(0.0)
-    for i in state.current:
+    for current, lag in zip(state.current, state.lag, strict=True):
+        i = current + lag
         out = out + i * (0.5 * np.sign(i.value))
     return out
 

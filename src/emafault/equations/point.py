@@ -60,6 +60,7 @@ class State:
     dT: Dual
     current: list[Dual]
     shown: list[Dual]
+    lag: list[Dual]
     current_end: list[Dual]
     turns: list[Dual]
     k: list[Dual]

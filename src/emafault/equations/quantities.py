@@ -24,7 +24,7 @@ def fill(state: State) -> None:
     rec.ahead = _sum(state, "angle") + p.own("zero")
     rec.load, rec.spring = _sum(state, "load"), _sum(state, "spring")
     rec.flexible = flexible(state)
-    state.current, state.current_end, state.shown = true_currents(rec, p)
+    state.current, state.current_end, state.shown, state.lag = true_currents(rec, p)
     _angles(state)
     _coefficients(state)
     _resistances(state)
