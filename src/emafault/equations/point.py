@@ -50,7 +50,8 @@ def effect_name(module) -> str:
 class State:
     """What several equations share at one point of one recording, derived from the recorded signals and the point.
 
-    Lists are by phase. ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
+    Lists are by phase. ``shown`` mean currents that the sensors show (A), ``lag`` what the recorded ones are beyond
+    those on time (A), ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
     ``conducting`` mean of f over the part in which the phase is switched on, ``inductance`` (H), ``rise`` its voltage
     (V), ``loss`` copper loss (W), ``bus_current`` (A), ``drive`` torque of the motor (N m),
     ``shared`` the same less that of the load (N m), ``net`` less friction as well,
