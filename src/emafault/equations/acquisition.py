@@ -6,6 +6,7 @@ T has y + T dy/dt = x, of which the mean over an interval is exact where the fil
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -212,10 +213,19 @@ def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual |
     return out
 
 
-def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[Dual], list[Dual]]:
-    """Mean and end currents (A) of each phase from the recorded ones, less lag, curve, crosstalk and drift, then less
-    offset and gain of the sensors; mean currents that these show, as the regulator sees them; and what the recorded
-    ones are beyond those on time."""
+class Currents(NamedTuple):
+    """Currents (A) by phase, (sample,) each: true means and those at the intervals' ends, means that the sensors show,
+    as the regulator sees them, and what the recorded means are beyond those on time."""
+
+    mean: list[Dual]
+    end: list[Dual]
+    shown: list[Dual]
+    lag: list[Dual]
+
+
+def currents(rec: Signals, p: Point) -> Currents:
+    """The currents from the recorded ones: less lag, curve, crosstalk and drift of the recorder, then less offset and
+    gain of the sensors."""
     rounding = _rounding(rec, p)
     means: list[Dual] = []
     ends: list[Dual] = []
@@ -247,4 +257,4 @@ def true_currents(rec: Signals, p: Point) -> tuple[list[Dual], list[Dual], list[
         mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
         for j in range(3):
             out[j] = out[j] - mean
-    return means, ends, shown, lag
+    return Currents(means, ends, shown, lag)

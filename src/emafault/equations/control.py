@@ -66,7 +66,7 @@ def residual(state: State) -> Dual:
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
-    flowing = (_true_level(state) - _beyond(state)) * sign + _sensors_show(state)
+    flowing = (_level(state) - _beyond(state)) * sign + _sensors_show(state)
     flowing = flowing.linear(lambda x: _calmed(x, h), rec.size) / gain
     # the current changes as the demand does, and is known with less noise
     asked_for = asked_for - late * np.gradient(np.asarray(value_of(flowing)), h)
@@ -110,7 +110,7 @@ def _least_risk(rec) -> int:
     return min(risk, key=lambda span: risk[span])
 
 
-def _true_level(state: State) -> Dual:
+def _level(state: State) -> Dual:
     """(sample,) half the sum of the absolute phase currents (A), as late as they are recorded: what undoes a lag
     amplifies noise."""
     out = Dual(0.0)

@@ -211,7 +211,7 @@ class ReferenceActuator:
         interval an edge lies. ``less`` as in ``blocks``."""
         state = State(_less(self.recordings[name], less), Point(values, name, ()))
         if equation == "sensor_speed":
-            return np.array([sensor_speed.of_angle(state, row) for row in x])
+            return np.array([sensor_speed.seen_rate(state, row) for row in x])
         rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
         return self.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
 

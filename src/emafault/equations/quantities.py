@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..actuator.shape import trapezoid_at, trapezoid_swept
-from .acquisition import true_currents
+from .acquisition import currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
 from .signals import passing_time
@@ -24,7 +24,7 @@ def fill(state: State) -> None:
     rec.ahead = _sum(state, "angle") + p.own("zero")
     rec.load, rec.spring = _sum(state, "load"), _sum(state, "spring")
     rec.flexible = flexible(state)
-    state.current, state.current_end, state.shown, state.lag = true_currents(rec, p)
+    state.current, state.current_end, state.shown, state.lag = currents(rec, p)
     _angles(state)
     _coefficients(state)
     _resistances(state)

@@ -37,13 +37,10 @@ def seen_speed(state: State, w: Dual) -> Dual:
     return w
 
 
-def of_angle(state: State, x: np.ndarray) -> np.ndarray:
-    """(sample,) what the sensor makes (rad/s) of the rate of a part x (rad) of the angle."""
+def seen_rate(state: State, x: np.ndarray) -> np.ndarray:
+    """(sample,) what the sensor, which is linear, makes (rad/s) of the rate of a part x (rad) of the angle."""
     rate = np.diff(x, prepend=x[:1]) / state.rec.interval
-    with_it, without = (
-        recorded_late(state.p, "speed", seen_speed(state, Dual(r)), state.rec.size).value for r in (rate, 0.0 * rate)
-    )
-    return np.asarray(with_it) - np.asarray(without)
+    return np.asarray(recorded_late(state.p, "speed", seen_speed(state, Dual(rate)), state.rec.size).value)
 
 
 def noise_bands(state: State) -> list[np.ndarray]:

@@ -15,8 +15,8 @@ from .verdict import Fitted
 def unconfirmed(fitted: Fitted) -> list[dict[str, Any]]:
     """Warnings of described forms that the recordings set aside neither confirmed nor could have.
 
-    One that is as the explored recordings have it would gain there half the squared size of its signal, in units of the
-    noise, on average.
+    One that is as the explored recordings have it would gain there half the squared size of its signal, in units of
+    the noise, on average. Forms of another size in each recording are not asked.
     """
     held_out = fitted.held_out
     if held_out is None:
