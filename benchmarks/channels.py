@@ -124,6 +124,16 @@ def times(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
     return lambda x, n: x * (1.0 + size * each(n))
 
 
+def growing(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    """A gain that is off by a size at the recording's end."""
+    return lambda x, n: x * (1.0 + size * np.linspace(0.0, 1.0, len(x)))[:, None]
+
+
+def with_hum(r: Recording, n: int) -> Recording:
+    """All voltages with one wave of 50 Hz, whose phase is another in each recording."""
+    return replace(r, phase_voltage=r.phase_voltage + 0.2 * np.sin(2.0 * np.pi * 50.0 * r.time + 2.0 * n)[:, None])
+
+
 CHANNELS = {
     "currents in steps of 20 mA": Channel(in_steps("current", 0.02), ("adc_step in sensor_current",)),
     "currents in steps of 50 mA": Channel(in_steps("current", 0.05), ("adc_step in sensor_current",)),
@@ -160,6 +170,10 @@ CHANNELS = {
         "drift in sensor_current", phase_current=times(0.01), phase_current_end=times(0.01)
     ),
     "gain of the voltages by recording": changed("drift in sensor_voltage", phase_voltage=times(0.01)),
+    "gain of the currents that drifts": changed(
+        "drift in sensor_current", phase_current=growing(0.01), phase_current_end=growing(0.01)
+    ),
+    "hum of all voltages": Channel(itself=("frequency in sensor_voltage",), change=with_hum),
     "gain of a phase's voltage by recording": changed(
         "drift in sensor_voltage", phase_voltage=lambda v, n: v * (1.0 + 0.01 * each(n) * np.array([0.0, 0.0, 1.0]))
     ),

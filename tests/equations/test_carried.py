@@ -107,6 +107,10 @@ def test_a_place_is_what_its_driver_multiplies(equation, driver):
 def test_what_is_in_a_channel_or_a_coefficient_lies_there():
     form = described("order", "sensor_angle", channel="angle")
     assert of_form(form, coefficients(form, ["a"]), ["a"], ACTUATOR)["place"] == "angle"
+    form = described("step_change", "sensor_voltage", channel="voltage")
+    entry = of_form(form, coefficients(form, ["a"]), ["a"], ACTUATOR)
+    assert entry["place"] == "voltage"
+    check_unlisted([entry])
     form = described("bump", "electrical_b", 2, channel="k_b")
     entry = of_form(form, {form.names("a")[0]: (-0.1, 0.01)}, ["a"], ACTUATOR)
     assert entry == {"place": "emf_b", "form": "bump", "centre": 6.0, "width": 0.4, "depth": -0.1}
@@ -183,6 +187,14 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             "~gain_voltage",
             {"gain_voltage.c@one.nc": 0.01},
             {"place": "voltage_c", "form": "gain", "gain": 0.01, "recordings": {"one.nc": {"gain": 0.01}}},
+        ),
+        (
+            "~gain_current",
+            {"gain_drift_current.a@one.nc": 0.01, "gain_drift_current.a@two.nc": 0.02},
+            {
+                "place": "current_a", "form": "gain", "gain": 0.0, "growth": 0.015,
+                "recordings": {"one.nc": {"gain": 0.0, "growth": 0.01}, "two.nc": {"gain": 0.0, "growth": 0.02}},
+            },
         ),
     ],
 )  # fmt: skip

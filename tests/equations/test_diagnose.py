@@ -232,6 +232,30 @@ def test_a_gain_that_differs_between_recordings_is_told_and_undone(tmp_path):
         assert _off(undone, true, variable) < 0.4 * _off(changed, true, variable)
 
 
+def test_a_gain_that_drifts_and_a_hum_of_all_voltages_are_told_and_undone():
+    """They had been told as a torque constant that builds up, and as waves of two phases beside a remainder."""
+    true, faulty = bench(COGGING), {}
+    for n, (name, r) in enumerate(true.items()):
+        grows = 1.0 + 0.01 * (r.time / r.time[-1])[:, None]
+        hum = 0.2 * np.sin(2.0 * np.pi * 50.0 * (r.time - 0.5 * r.interval) + 2.0 * n)[:, None]
+        faulty[name] = replace(
+            r, phase_current=grows * r.phase_current, phase_current_end=grows * r.phase_current_end,
+            phase_voltage=r.phase_voltage + hum,
+        )  # fmt: skip
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    told = {d["equation"]: d for d in found.verdict["discovered"]}
+    assert {e: d["form"] for e, d in told.items()} == {"sensor_current": "drift", "sensor_voltage": "frequency"}
+    for p in told["sensor_current"]["parameters"].values():
+        assert p["low"] < 0.01 < p["high"]
+    assert told["sensor_voltage"]["parameters"]["frequency"]["value"] == pytest.approx(50.0, abs=0.02)
+    assert "each of the recorded voltages" in told["sensor_voltage"]["sentence"]
+    undone, _ = corrected(found, faulty)
+    for variable in ("phase_current", "phase_current_end", "phase_voltage"):
+        assert _off(undone, true, variable) < 0.2 * _off(faulty, true, variable), variable
+
+
 def test_faults_of_three_channels_at_once_are_told_and_undone(tmp_path):
     """An offset of one current that is another in each recording, crosstalk of the voltages, an offset of the speed."""
     true, faulty = bench(COGGING), {}

@@ -74,3 +74,10 @@ def test_a_gain_of_all_phases_is_told_against_that_in_one_recording(of, said):
     gains = {f"gain_voltage.{of}@{n}.nc": (0.01 * n, 1e-4) for n in (1, 2)}
     told = told_of_chain("~gain_voltage", "sensor_voltage", gains, dict.fromkeys(gains, "1"), ACTUATOR)
     assert told["sentence"].endswith(said)
+
+
+def test_a_gain_that_drifts_is_told_with_what_it_comes_to():
+    gains = {f"gain_drift_current.all@{n}.nc": (0.01 * n, 1e-4) for n in (1, 2)}
+    told = told_of_chain("~gain_current", "sensor_current", gains, dict.fromkeys(gains, "1"), ACTUATOR)
+    said = "In the measuring chain: the gain of the recorded currents drifts along each recording, by +1 to +2 % to its"
+    assert told["sentence"] == f"{said} end." and told["form"] == "drift"

@@ -135,6 +135,7 @@ class Chain:
     def _change(self, x: np.ndarray, entry: Mapping[str, Any]) -> None:
         """Curve, gain, lag, filter or drift of a channel (time,) or (time, phase), in place."""
         form, quantity = entry["form"], entry["place"].partition("_")[0]
+        share = (np.arange(len(x)) + 0.5) / len(x)
         if form == "sensor_curve":
             full = self.run["current_limit"] if quantity == "current" else 0.5 * self.run["bus_voltage"]
             x -= entry["bend"] * x * (x / full) ** 2
@@ -146,10 +147,11 @@ class Chain:
             through = smoothed if form == "smoothing" else filtered
             x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
         elif form == "gain":
-            x += entry["gain"] * x
+            gain = entry["gain"] + entry.get("growth", 0.0) * share
+            x *= 1.0 + (gain[:, None] if x.ndim == 2 else gain)
         elif form == "drift":
             start = entry.get("at_start", 0.0)
-            x += start + (entry["at_end"] - start) * (np.arange(len(x)) + 0.5) / len(x)
+            x += start + (entry["at_end"] - start) * share
 
 
 def _channels(signals: Signals, place: str) -> list[np.ndarray]:

@@ -42,8 +42,8 @@ ANY, _SMALLEST = (-1e6, 1e6), 1e-6
 #: parameter -> lowest and highest value, unit; without one it has the place's
 PARAMETERS: dict[str, tuple[float, float, str]] = {
     "amplitude": (*ANY, ""), "jump": (*ANY, ""), "at_100_rad_s": (*ANY, ""), "depth": (*ANY, ""), "gain": (*ANY, ""),
-    "at_start": (*ANY, ""), "at_end": (*ANY, ""), "drop": (*ANY, "V"), "turn": (_SMALLEST, 1e6, "A"),
-    "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
+    "growth": (*ANY, ""), "at_start": (*ANY, ""), "at_end": (*ANY, ""), "drop": (*ANY, "V"),
+    "turn": (_SMALLEST, 1e6, "A"), "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
     "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
@@ -60,14 +60,15 @@ SHAPES = {
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
-    "sensor_curve": ("bend",), "gain": ("gain",), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
+    "sensor_curve": ("bend",), "gain": ("gain", "growth"), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "clipping": ("level",), "adc_step": ("step",),
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
 OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
 FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER
-#: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing
-OPTIONAL = {"frequency": ("phase",), "drift": ("at_start",)}
+#: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing, a
+#: gain that stays
+OPTIONAL = {"frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",)}
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
 EACH = "recordings"
 

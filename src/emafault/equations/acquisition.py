@@ -19,6 +19,8 @@ from .signals import Signals
 from .terms import with_hook
 
 STEP = 1e-4  # interval, of a difference by them
+#: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
+GAIN_NAMES = ("gain", "gain_drift")
 
 
 def delayed(x: np.ndarray) -> np.ndarray:
@@ -204,12 +206,14 @@ def drifting(recording: str) -> tuple[tuple[str, str], ...]:
 
 
 def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
-    """Factor between a channel's recorded and true signal, of the recording's own."""
+    """Factor between a channel's recorded and true signal, of the recording's own, that may grow along it."""
     out: Dual | float = 1.0
     for of in ("all", phase):
-        gain = p(f"gain_{quantity}.{of}@{rec.name}")
+        gain, growth = (p(f"{n}_{quantity}.{of}@{rec.name}") for n in GAIN_NAMES)
         if gain.slopes or gain.value:
             out = out + gain
+        if growth.slopes or growth.value:
+            out = out + growth * (rec.time / rec.time[-1])
     return out
 
 

@@ -13,6 +13,7 @@ from ..actuator.grammar import EACH, PHASES
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
+from .acquisition import GAIN_NAMES
 from .telling import subject
 
 Entry = dict[str, Any]
@@ -106,7 +107,11 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})
     if kind == "gain":
         phase = next(iter(linear)).partition(".")[2].partition("@")[0]
-        gains = {full.partition("@")[2]: {"gain": v} for full, (v, _) in linear.items()}
+        growth = next(iter(linear)).startswith(GAIN_NAMES[1])
+        gains = {
+            full.partition("@")[2]: {"gain": 0.0, "growth": v} if growth else {"gain": v}
+            for full, (v, _) in linear.items()
+        }
         place = channel if phase == "all" else f"{channel}_{phase}"
         return _rounded({"place": place, "form": "gain", **_means(gains), EACH: gains})
     if kind == "drift":

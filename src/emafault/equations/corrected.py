@@ -12,7 +12,7 @@ from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import calm_motion, without_spikes
 from ..switches import direction
-from .acquisition import drifting, full_range, rates, undone
+from .acquisition import GAIN_NAMES, drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
 
@@ -79,8 +79,12 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
                 x = _drifted(values, quantity, phase, name, share)
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
         if f"~gain_{quantity}" in told:
-            gain = np.array([sum(values.get(f"gain_{quantity}.{of}@{name}", 0.0) for of in ("all", j)) for j in "abc"])
-            yield f"gain of the {quantity} channels", partial(_over, quantity=quantity, gains=1.0 + gain)
+            gain, growth = (
+                np.array([sum(values.get(f"{n}_{quantity}.{of}@{name}", 0.0) for of in ("all", j)) for j in "abc"])
+                for n in GAIN_NAMES
+            )
+            gains = 1.0 + gain + growth * share[:, None]
+            yield f"gain of the {quantity} channels", partial(_over, quantity=quantity, gains=gains)
 
 
 def write_corrected(
@@ -111,7 +115,7 @@ def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Rec
 
 
 def _over(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:
-    """``gains`` (phase,) of a channel, recorded over true."""
+    """``gains`` (sample, phase) of a channel, recorded over true."""
     if quantity == "voltage":
         return replace(recording, phase_voltage=recording.phase_voltage / gains)
     return _currents(recording, lambda x: x / gains)
@@ -136,6 +140,8 @@ def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
         return replace(recording, rotor_angle=recording.rotor_angle - x)
     if channel == "output":
         return replace(recording, output_position=recording.output_position - x)
+    if channel == "voltage":
+        return replace(recording, phase_voltage=recording.phase_voltage - x[:, None])
     quantity, phase = channel.split("_")
     off = np.outer(x, np.eye(3)["abc".index(phase)])
     if quantity == "voltage":

@@ -21,7 +21,7 @@ from .signals import Signals
 CHANNELS = {
     ("sensor_speed", 0): ("angle",), ("sensor_speed", 1): ("angle",), ("torque", 0): ("angle",),
     ("position", 0): ("angle", "output"), ("sensor_current", 0): ("current_a", "current_b", "current_c"),
-    ("electrical_a", 0): ("current_a",), ("electrical_b", 0): ("current_b",), ("electrical_c", 0): ("current_c",),
+    **{(f"electrical_{j}", 0): (f"current_{j}", "voltage") for j in "abc"},
 }  # fmt: skip
 #: equations by name, beside those of the phases
 OF_STATE = {

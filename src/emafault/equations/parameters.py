@@ -10,7 +10,7 @@ from ..diagnosis.model import TOLERANCES, Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
 from ..switches import TURN
-from . import commutation, position
+from . import acquisition, commutation, position
 from .point import SEEDED
 from .signals import REST, Signals
 from .terms import TERMS
@@ -27,7 +27,7 @@ BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
 FAR_OUT = 100.0  # of a channel's noise, for the scale of its offset
 WARM = 30.0  # K, by which a machine may not have the recorded ambient temperature
-GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next
+GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next, or along one
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -201,10 +201,12 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
             among = 4.0 * (len(phases) + 1 if len(phases) > 1 else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
         if len(phases) > 1 and others:
-            # what all phases' gains have in common in all recordings is the unit's own calibration
+            # what all phases' gains have in common in all recordings is the unit's own calibration, but for their drift
+            level, growth = acquisition.GAIN_NAMES
             gains = [
-                Variant([Parameter(f"gain_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in of])
-                for j, of in (("all", others), *((j, recordings) for j in phases))
+                Variant([Parameter(f"{kind}_{quantity}.{j}@{n}", 0.0, 0.0, GAIN, "1") for n in of])
+                for kind, of_all in ((level, others), (growth, recordings))
+                for j, of in (("all", of_all), *((j, recordings) for j in phases))
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
     # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere

@@ -179,7 +179,7 @@ class Signals:
         return out
 
     def less(self, channel: str, x: np.ndarray) -> "Signals":
-        """A copy with (sample,) x taken off a channel: ``angle``, ``output``, or the current of a phase."""
+        """A copy with (sample,) x taken off a channel: ``angle``, ``output``, all of ``voltage``, or a current."""
         if channel == "angle":
             out = self._changed(angle=self.angle - x)
             if self.drawn_from is not self:
@@ -187,6 +187,8 @@ class Signals:
             return out
         if channel == "output":
             return self._changed(output=self.output - x)
+        if channel == "voltage":
+            return self._changed(voltage=self.voltage - np.asarray(x)[:, None])
         unit = np.eye(3)["abc".index(channel[-1])]
         end = None
         if self.current_end is not None:

@@ -24,8 +24,11 @@ def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, fl
         return f"the back-EMF coefficient of phase {form.channel[-1]}, as a share of it,", "1", 1.0
     if form.channel:
         quantity, _, phase = form.channel.partition("_")
-        words = {"angle": "the recorded rotor angle", "output": "the recorded output position"}
-        units = {"angle": "rad", "output": "rad"}
+        words = {
+            "angle": "the recorded rotor angle", "output": "the recorded output position",
+            "voltage": "each of the recorded voltages",
+        }  # fmt: skip
+        units = {"angle": "rad", "output": "rad", "voltage": "V"}
         return words.get(quantity, f"the recorded {quantity} of phase {phase}"), units.get(quantity, "A"), 1.0
     torque = typical_torque(actuator)
     if form.equation.startswith("electrical"):

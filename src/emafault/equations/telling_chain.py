@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
-from .acquisition import full_range
+from .acquisition import GAIN_NAMES, full_range
 from .telling import Z
 
 LATE = {
@@ -136,8 +136,13 @@ def _drift(fault: Fault) -> Told:
 
 
 def _gain(fault: Fault) -> Told:
-    phase = next(iter(fault.linear)).partition(".")[2].partition("@")[0]
+    first = next(iter(fault.linear))
+    phase = first.partition(".")[2].partition("@")[0]
     gains = list(fault.values.values())
+    if first.startswith(GAIN_NAMES[1]):
+        whose = of_phase(fault.channel, "" if phase == "all" else phase)
+        ends = f"by {100.0 * min(gains):+z.2g} to {100.0 * max(gains):+z.2g} %"
+        return Told(f"the gain of the recorded {whose} drifts along each recording, {ends} to its end", "drift")
     against = ""
     if phase == "all":  # told against one recording, which has none
         phase, against = "", " from that in one of them"

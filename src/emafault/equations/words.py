@@ -1,6 +1,7 @@
 """Fitted numbers of the reference actuator in words, as the table of a page has them; keys stay those of the model."""
 
 from ..diagnosis.described import Described
+from .acquisition import GAIN_NAMES
 from .point import SEEDED
 from .telling import bare
 from .telling_chain import CHANNELS, LATE, of_phase
@@ -124,8 +125,11 @@ def _of_group(group: str, short: str) -> str:
             for kind in ("drift", "offset")
             for q in ("current", "voltage", "speed", "output")
         },
-        "gain_current": f"gain of the {of_phase('current', short.removeprefix('all'))}, less one",
-        "gain_voltage": f"gain of the {of_phase('voltage', short.removeprefix('all'))}, less one",
+        **{
+            f"{kind}_{q}": f"gain of the {of_phase(q, short.removeprefix('all'))}, {what}"
+            for kind, what in zip(GAIN_NAMES, ("less one", "change along the recording"), strict=True)
+            for q in ("current", "voltage")
+        },
     }
     return chain[group] if group in chain else effect_number(group, short.removeprefix("log_"))
 
