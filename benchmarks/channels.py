@@ -129,6 +129,11 @@ def growing(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
     return lambda x, n: x * (1.0 + size * np.linspace(0.0, 1.0, len(x)))[:, None]
 
 
+def warming(size: float) -> Callable[[np.ndarray, int], np.ndarray]:
+    """An offset of phase a that settles at a size, with a time constant of a quarter of the recording."""
+    return lambda x, n: x + np.outer(size * (1.0 - np.exp(-np.linspace(0.0, 4.0, len(x)))), [1.0, 0.0, 0.0])
+
+
 def with_hum(r: Recording, n: int) -> Recording:
     """All voltages with one wave of 50 Hz, whose phase is another in each recording."""
     return replace(r, phase_voltage=r.phase_voltage + 0.2 * np.sin(2.0 * np.pi * 50.0 * r.time + 2.0 * n)[:, None])
@@ -174,6 +179,10 @@ CHANNELS = {
         "drift in sensor_current", phase_current=growing(0.01), phase_current_end=growing(0.01)
     ),
     "hum of all voltages": Channel(itself=("frequency in sensor_voltage",), change=with_hum),
+    "offset of a current that warms up": changed(
+        "drift in sensor_current", phase_current=warming(0.05), phase_current_end=warming(0.05)
+    ),
+    "scale of the output position": changed("sensor_curve in sensor_output", output_position=lambda x, n: 1.003 * x),
     "gain of a phase's voltage by recording": changed(
         "drift in sensor_voltage", phase_voltage=lambda v, n: v * (1.0 + 0.01 * each(n) * np.array([0.0, 0.0, 1.0]))
     ),

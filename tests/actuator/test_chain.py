@@ -93,6 +93,8 @@ def test_channels_faults(true):
     share = (np.arange(1000) + 0.5) / 1000
     growing = changed(true, place="current", form="gain", gain=0.02, growth=0.01)["phase_current"]
     np.testing.assert_allclose(growing, (0.02 + 0.01 * share)[:, None] * i, atol=1e-12)
+    scaled = changed(true, place="output", form="gain", gain=0.01)["output_position"]
+    np.testing.assert_allclose(scaled, 0.01 * true["output_position"][0], atol=1e-12)
     growing = changed(true, place="voltage_b", form="gain", gain=0.0, growth=0.01)["phase_voltage"]
     np.testing.assert_allclose(growing, np.outer(0.01 * share * v[:, 1], [0, 1, 0]), atol=1e-12)
 

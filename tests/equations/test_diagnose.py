@@ -232,28 +232,58 @@ def test_a_gain_that_differs_between_recordings_is_told_and_undone(tmp_path):
         assert _off(undone, true, variable) < 0.4 * _off(changed, true, variable)
 
 
-def test_a_gain_that_drifts_and_a_hum_of_all_voltages_are_told_and_undone():
-    """They had been told as a torque constant that builds up, and as waves of two phases beside a remainder."""
+def test_faults_that_grow_hum_and_scale_are_told_and_undone():
+    """A gain of the currents that drifts had been told as a torque constant that builds up, a hum of all voltages as
+    waves of two phases beside a remainder, a scale of the output as a delay of the controller."""
     true, faulty = bench(COGGING), {}
     for n, (name, r) in enumerate(true.items()):
         grows = 1.0 + 0.01 * (r.time / r.time[-1])[:, None]
         hum = 0.2 * np.sin(2.0 * np.pi * 50.0 * (r.time - 0.5 * r.interval) + 2.0 * n)[:, None]
         faulty[name] = replace(
             r, phase_current=grows * r.phase_current, phase_current_end=grows * r.phase_current_end,
-            phase_voltage=r.phase_voltage + hum,
+            phase_voltage=r.phase_voltage + hum, output_position=1.003 * r.output_position,
         )  # fmt: skip
     names = list(faulty)
     found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
     assert found.verdict["which"][0]["effects"] == ["cogging"]
-    told = {d["equation"]: d for d in found.verdict["discovered"]}
-    assert {e: d["form"] for e, d in told.items()} == {"sensor_current": "drift", "sensor_voltage": "frequency"}
-    for p in told["sensor_current"]["parameters"].values():
+    told = {d["unit"]: d for d in found.verdict["discovered"]}
+    assert {(d["form"], d["equation"]) for d in told.values()} == {
+        ("drift", "sensor_current"), ("frequency", "sensor_voltage"), ("sensor_curve", "sensor_output"),
+    }  # fmt: skip
+    for p in told["~gain_current"]["parameters"].values():
         assert p["low"] < 0.01 < p["high"]
-    assert told["sensor_voltage"]["parameters"]["frequency"]["value"] == pytest.approx(50.0, abs=0.02)
-    assert "each of the recorded voltages" in told["sensor_voltage"]["sentence"]
+    hum = next(d for d in told.values() if d["form"] == "frequency")
+    assert hum["parameters"]["frequency"]["value"] == pytest.approx(50.0, abs=0.02)
+    assert "each of the recorded voltages" in hum["sentence"]
+    assert told["~gain_output"]["sentence"].endswith("the output position is recorded 0.3 % too large.")
     undone, _ = corrected(found, faulty)
-    for variable in ("phase_current", "phase_current_end", "phase_voltage"):
+    for variable in ("phase_current", "phase_current_end", "phase_voltage", "output_position"):
         assert _off(undone, true, variable) < 0.2 * _off(faulty, true, variable), variable
+
+
+def test_an_offset_that_warms_up_is_told_and_undone():
+    """It had been told as a step beside a function of one kind and another."""
+    true = bench(COGGING)
+    warms = {name: np.outer(0.05 * (1.0 - np.exp(-4.0 * r.time / r.time[-1])), [1, 0, 0]) for name, r in true.items()}
+    faulty = {
+        name: replace(r, phase_current=r.phase_current + x, phase_current_end=r.phase_current_end + x)
+        for (name, r), x in zip(true.items(), warms.values(), strict=True)
+    }
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["form"], told["equation"], told["term"]["place"]) == ("drift", "sensor_current", "current_a")
+    undone, _ = corrected(found, faulty)
+    assert _off(undone, true, "phase_current") < 0.05 * _off(faulty, true, "phase_current")
+
+
+def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder():
+    verdict = verdict_of(bench(COGGING, replace(ACTUATOR, gear_ratio=ACTUATOR.gear_ratio / 1.003)))
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = verdict["discovered"]
+    assert told["parameters"]["gain_output.sensor"]["value"] == pytest.approx(0.003, rel=0.05)
+    assert "the controller sees it so" in told["sentence"]
 
 
 def test_faults_of_three_channels_at_once_are_told_and_undone(tmp_path):

@@ -83,7 +83,7 @@ def forms_at(place: str) -> list[str]:
     quantity, _, phase = place.partition("_")
     phased = quantity in ("voltage", "current")
     only = {
-        "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased,
+        "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased or quantity == "output",
         "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output"),
     }  # fmt: skip
     return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]

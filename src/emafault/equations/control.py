@@ -37,7 +37,8 @@ def residual(state: State) -> Dual:
     # and the angle behind the gear have little of it, and what the recorded ones differ from them is averaged, over
     # a span that takes out the noise and leaves the sensor's own dynamics
     shaft = position.shaft_angle(state)
-    output = shaft + position.residual(state).linear(lambda x: _averaged(x, h), rec.size)
+    output = shaft + position.scaled(state, shaft, "sensor")
+    output = output + position.residual(state).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
     span = _speed_span(state)
     beyond = (_calmed(rec.speed_recorded, h) - model).linear(

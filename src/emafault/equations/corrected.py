@@ -15,6 +15,7 @@ from ..switches import direction
 from .acquisition import GAIN_NAMES, drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
+from .position import SCALED
 
 Undo = Callable[[Recording], Recording]
 #: forms that a voltage of one phase has from its channel: nothing in the machine makes them
@@ -73,6 +74,9 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
         if f"~drift_{quantity}" in told:
             x = _drifted(values, quantity, "all", name, share)
             yield f"drift of the {quantity}", partial(_less, channel=quantity, x=x)
+    if "~gain_output" in told:
+        scale = 1.0 + sum(values.get(f"gain_output.{whose}", 0.0) for whose in SCALED)
+        yield "scale of the output position", partial(_rescaled, scale=scale)
     for quantity in ("voltage", "current"):
         for phase in "abc":
             if f"~drift_{quantity}_{phase}" in told:
@@ -119,6 +123,10 @@ def _over(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:
     if quantity == "voltage":
         return replace(recording, phase_voltage=recording.phase_voltage / gains)
     return _currents(recording, lambda x: x / gains)
+
+
+def _rescaled(recording: Recording, scale: float) -> Recording:
+    return replace(recording, output_position=recording.output_position / scale)
 
 
 def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recording:

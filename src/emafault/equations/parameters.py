@@ -34,6 +34,7 @@ GAIN_PRIOR = 0.3  # relative, of the controller's gains
 PER_PHASE = ("a", "b", "c")
 #: equations that a channel's faults show in, beside the one that is named after it
 IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",), "bus_voltage": ("bus",)}
+GAINED = ("current", "voltage", "output")  # quantities whose gain may be off
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 #: of what an effect is fitted in that its catalogue does not have
@@ -178,9 +179,10 @@ def _shows(channel: str) -> tuple[str, ...]:
 
 
 def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
-    """Channels whose offset grows along a recording or is another one in each, or whose gain is.
+    """Channels whose offset grows along a recording or is another one in each, or whose gain is; and a scale of the
+    output position that is off.
 
-    A current's offset that is always the same is in the catalogue.
+    A current's offset that is always the same is in the catalogue, and so is the speed's scale.
     """
     out = []
     others = [n for n in recordings if n != reference]
@@ -198,7 +200,7 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
             unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
             variants += [always] if quantity != "current" else []
             # evenly over the quantities, then over a quantity's phases and its gain
-            among = 4.0 * (len(phases) + 1 if len(phases) > 1 else 1)
+            among = 4.0 * (len(phases) + 1 if quantity in GAINED else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
         if len(phases) > 1 and others:
             # what all phases' gains have in common in all recordings is the unit's own calibration, but for their drift
@@ -209,6 +211,9 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
                 for j, of in (("all", of_all), *((j, recordings) for j in phases))
             ]
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
+        if quantity == "output":
+            scales = [Variant([Parameter(f"gain_output.{whose}", 0.0, 0.0, GAIN, "1")]) for whose in position.SCALED]
+            out.append(Unit("~gain_output", "form", _shows(quantity), scales, among=among))
     # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere
     warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K") for n in recordings]
     out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=4.0))

@@ -11,6 +11,7 @@ from .point import State, effect_name
 from .terms import with_hook
 
 HARMONICS = 3  # of the error of rounding, with 83 % of its variance
+SCALED = ("recorder", "sensor")  # whose scale of the output may be off: the controller sees its sensor's
 
 
 def shaft_angle(state: State) -> Dual:
@@ -23,9 +24,19 @@ def shaft_angle(state: State) -> Dual:
     return shaft
 
 
+def scaled(state: State, shaft: Dual, whose: str) -> Dual | float:
+    """(sample,) what a scale of the output position that is off adds to the shaft's angle (rad); ``whose``: of
+    ``SCALED``."""
+    gain = state.p(f"gain_output.{whose}")
+    return gain * shaft if gain.slopes or gain.value else 0.0
+
+
 def residual(state: State) -> Dual:
     """Recorded less predicted angle of the user shaft (rad)."""
-    shaft = shaft_angle(state) + state.p(f"output_zero@{state.rec.name}")
+    shaft = shaft_angle(state)
+    for whose in SCALED:
+        shaft = shaft + scaled(state, shaft, whose)
+    shaft = shaft + state.p(f"output_zero@{state.rec.name}")
     seen = recorded_late(state.p, "output", shaft + _rounding(state, shaft), state.rec.size)
     return state.rec.output - (seen + drifted(state.p, "output", "all", state.rec))
 

@@ -127,7 +127,8 @@ def _along(form: Described) -> str:
 def _of_a_clock(form: Described) -> bool:
     """Whether it adds something that goes with time alone."""
     source = memory.SOURCES[int(form.values["source"])] if form.word == "memory" else "start"
-    return form.driver == 0 and not form.channel and _along(form) == "time" and source == "start"
+    adds = not form.channel.startswith("k_") if form.channel else form.driver == 0
+    return adds and _along(form) == "time" and source == "start"
 
 
 def _warms_up(form: Described) -> bool:

@@ -137,6 +137,11 @@ def _drift(fault: Fault) -> Told:
 
 def _gain(fault: Fault) -> Told:
     first = next(iter(fault.linear))
+    if fault.channel == "output":
+        (gain,) = fault.values.values()
+        size = f"{100.0 * abs(gain):.2g} % too {'large' if gain > 0.0 else 'small'}"
+        also = ", and the controller sees it so" * first.endswith("sensor")
+        return Told(f"the output position is recorded {size}{also}", "sensor_curve", "output_angle")
     phase = first.partition(".")[2].partition("@")[0]
     gains = list(fault.values.values())
     if first.startswith(GAIN_NAMES[1]):

@@ -125,6 +125,7 @@ def _of_group(group: str, short: str) -> str:
             for kind in ("drift", "offset")
             for q in ("current", "voltage", "speed", "output")
         },
+        "gain_output": f"gain of the output position, less one, of the {short}",
         **{
             f"{kind}_{q}": f"gain of the {of_phase(q, short.removeprefix('all'))}, {what}"
             for kind, what in zip(GAIN_NAMES, ("less one", "change along the recording"), strict=True)
