@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from emafault.diagnosis.evidence import Normal
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Unit, Variant
 from emafault.diagnosis.sets import Choice, Model
@@ -51,6 +52,33 @@ def test_a_cause_is_fitted_beside_what_is_held_at_the_end_of_its_prior():
     assert bench.point["a"] == bench.reach
     again = bench.normal(bench.linearise(model, corrected=False), model)
     assert abs(bench.point["b"]) < 0.05 and abs(again.g[again.index["b"]]) < 0.01 * again.H[0, 0]
+
+
+def test_what_stands_beside_the_point_belongs_to_the_point_as_it_is():
+    """A set's own optimum may lie elsewhere along what its own form makes up for: its own form there, beside the values
+    here, had predicted nothing that was recorded."""
+    names = ["a", "b", "own.c.torque.0"]
+    columns = np.random.default_rng(1).standard_normal((ROWS, 3))
+    columns[:, 2] = columns[:, 0] + 0.01 * columns[:, 2]
+    residual = -columns @ [0.5, 0.0, 0.0] + np.random.default_rng(2).standard_normal(ROWS)  # 'a' lies 0.5 away
+    normal = Normal(names, columns.T @ columns, columns.T @ residual, float(residual @ residual))
+    there = Model((Choice("c", 0, 1.0),), deviations={"own.c.torque.0": 0.0})  # with 'a' moved
+
+    class Held(Bench):
+        def settle(self, model, normal=None, steps=3):
+            return there
+
+        def _fitted(self, model, corrected=True):
+            return model, normal
+
+        def widths(self, columns, model):
+            return np.ones(len(columns))
+
+    bench = Held(Machine(), ["r"])
+    (beside,) = bench.inserted(there, normal).beside.values()
+    left = residual + beside * columns[:, 2]
+    assert left @ left < 1.01 * ROWS < residual @ residual
+    assert bench.gained_beside(there, normal) == pytest.approx(0.5 * (residual @ residual - left @ left), rel=0.01)
 
 
 class Bent(Machine):

@@ -325,9 +325,13 @@ class NormalEquations(Point):
     def gained_beside(self, model: Model, normal: Normal) -> float:
         """Log evidence that a model's columns which are no parameters gain at the point (variable projection; Golub and
         Pereyra 1973, SIAM J. Numer. Anal. 10, 413)."""
+        return -0.5 * sum(float(normal.g[normal.index[n]]) * d for n, d in self.beside(model, normal).items())
+
+    def beside(self, model: Model, normal: Normal) -> dict[str, float]:
+        """A model's columns that are no parameters, which it is linear in, at their best at the point as it is."""
         names = [n for n in model.deviations if not is_parameter(n) and n in normal.index]
         if not names:
-            return 0.0
+            return {}
         k = np.array([normal.index[n] for n in names], int)
         A = normal.H[np.ix_(k, k)] + np.diag(1.0 / self.widths(names, model) ** 2)
-        return 0.5 * float(normal.g[k] @ Definite(A).solve(normal.g[k]))
+        return dict(zip(names, (-Definite(A).solve(normal.g[k])).tolist(), strict=True))

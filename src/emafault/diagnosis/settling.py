@@ -171,6 +171,9 @@ class Settling(NormalEquations):
         kept, sizes = self.here(), dict(self.sizes)
         found = self.settle(model, normal)
         values = self.values()
+        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
+        if beside:  # the point need not be where the model would have it, along what its own columns make up for
+            beside = self.beside(found, self._fitted(found)[1])
         own = {
             u: {self.parameters[n].alias or n: d for n, d in amounts.items()}
             for u, amounts in self.sizes.items()
@@ -178,7 +181,6 @@ class Settling(NormalEquations):
         }
         self.go_to(kept)
         self.sizes = sizes
-        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
         self._inserted[key] = Inserted(values, beside, own)
         return self._inserted[key]
 
