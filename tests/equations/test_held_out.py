@@ -108,6 +108,18 @@ def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     assert account.base.units == ("remainder:electrical_a",)
 
 
+def test_a_form_that_is_told_for_want_of_another_remainder_is_held_to_account():
+    """It is told with 0.6, for a remainder in its equation could be it; it had not been asked for below 0.9."""
+    kinds = {"~drift_output": "form", "~lag_voltage": "form", "remainder:position": "remainder"}
+    acts = {"~drift_output": "position", "~lag_voltage": "electrical", "remainder:position": "position"}
+    units = {u: Unit(u, kind, (acts[u],), []) for u, kind in kinds.items()}
+    weights = {("~drift_output",): 0.6, ("remainder:position",): 0.35, ("~lag_voltage",): 0.03, (): 0.02}
+    models = [Model(tuple(Choice(u, 0, 1.0) for u in of), float(np.log(w)), 0.0, {}, {}) for of, w in weights.items()]
+    sets = held_out._Sets(None, SimpleNamespace(models=models, search=SimpleNamespace(units=units)))
+    assert next(sets.untold({}, "form")) == "~drift_output"
+    assert list(sets.untold({"~drift_output": 4.0}, "form")) == list(sets.untold({}, "remainder")) == []
+
+
 @pytest.mark.parametrize(("shows", "ratio"), [(False, 0.0), (True, 40.0)])
 def test_a_form_is_confirmed_by_what_it_adds_itself(monkeypatch, shows, ratio):
     """What stands out in one explored recording distorts the rest where no form takes it: that the rest predicts better

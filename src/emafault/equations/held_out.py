@@ -13,7 +13,7 @@ from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
 from ..diagnosis.model import LISTED
-from ..diagnosis.naming import NAMED, OWN_BUSINESS, PRESENT, meet, read
+from ..diagnosis.naming import OWN_BUSINESS, PRESENT, meet, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Search
 from ..diagnosis.sets import Model, inclusion
@@ -84,7 +84,7 @@ def held_to_account(
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
     account.let_go_absent(sets.models)
-    for remainder in sets.untold(ratios, "remainder", PRESENT):
+    for remainder in sets.untold(ratios, "remainder"):
         ratios[remainder] = account.of_remainder(remainder)
         if ratios[remainder] < CLEAR:
             sets.drop(remainder, False)
@@ -114,7 +114,7 @@ def held_to_account(
 
 def _ask_forms(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:
     """Hold the described forms to account that the sets would tell."""
-    for form in sets.untold(ratios, "form", NAMED):
+    for form in sets.untold(ratios, "form"):
         ratios[form] = account.ratio(form)
         sets.add_dispersed(form, (form,))
         if ratios[form] < CLEAR:
@@ -150,12 +150,13 @@ class _Sets:
     def _is_unexplained(self, unit: str) -> bool:
         return meet(self.fit.search.units[unit].equations, self.unexplained)
 
-    def untold(self, ratios: Mapping[str, float], kind: str, least: float) -> Iterator[str]:
-        """Units of a kind that the sets, as they are by then, give at least a probability, not yet held to account."""
+    def untold(self, ratios: Mapping[str, float], kind: str) -> Iterator[str]:
+        """Forms or remainders that the sets, as they are by then, would tell, not yet held to account."""
         units = self.fit.search.units
         while True:
-            likely = (u for u, p in inclusion(self.models).items() if p >= least)
-            left = next((u for u in likely if u not in ratios and units[u].kind == kind), None)
+            found = read(self.models, units.values())
+            told = {u for u in (*found.forms, *found.remainders) if u not in ratios and units[u].kind == kind}
+            left = next((u for u in inclusion(self.models) if u in told), None)
             if left is None:
                 return
             yield left
