@@ -188,7 +188,7 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"gain_voltage.c@one.nc": 0.01},
             {"place": "voltage_c", "form": "gain", "gain": 0.01, "recordings": {"one.nc": {"gain": 0.01}}},
         ),
-        ("~gain_output", {"gain_output.recorder": 0.01}, {"place": "output", "form": "gain", "gain": 0.01}),
+        ("~scale_output", {"gain_output.recorder": 0.01}, {"place": "output", "form": "gain", "gain": 0.01}),
         (
             "~gain_current",
             {"gain_drift_current.a@one.nc": 0.01, "gain_drift_current.a@two.nc": 0.02},

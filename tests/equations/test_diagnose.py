@@ -255,7 +255,7 @@ def test_faults_that_grow_hum_and_scale_are_told_and_undone():
     hum = next(d for d in told.values() if d["form"] == "frequency")
     assert hum["parameters"]["frequency"]["value"] == pytest.approx(50.0, abs=0.02)
     assert "each of the recorded voltages" in hum["sentence"]
-    assert told["~gain_output"]["sentence"].endswith("the output position is recorded 0.3 % too large.")
+    assert told["~scale_output"]["sentence"].endswith("the output position is recorded 0.3 % too large.")
     undone, _ = corrected(found, faulty)
     for variable in ("phase_current", "phase_current_end", "phase_voltage", "output_position"):
         assert _off(undone, true, variable) < 0.2 * _off(faulty, true, variable), variable

@@ -171,8 +171,9 @@ class Settling(NormalEquations):
         kept, sizes = self.here(), dict(self.sizes)
         found = self.settle(model, normal)
         values = self.values()
-        beside = {n: d for n, d in found.deviations.items() if not is_parameter(n)}
-        if beside:  # the point need not be where the model would have it, along what its own columns make up for
+        beside: dict[str, float] = {}
+        if not all(map(is_parameter, found.deviations)):
+            # the point need not be where the model would have it, along what its own columns make up for
             beside = self.beside(found, self._fitted(found)[1])
         own = {
             u: {self.parameters[n].alias or n: d for n, d in amounts.items()}

@@ -105,7 +105,7 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     if kind == "controller":
         ((_, amount),) = values.items()
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})
-    if unit == "~gain_output":
+    if kind == "scale":
         ((whose, gain),) = values.items()  # what the controller sees too, a channel of the recorder does not make
         return _rounded({"place": "output", "form": "gain", "gain": gain}) if whose == "recorder" else None
     if kind == "gain":

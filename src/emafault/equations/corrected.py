@@ -74,7 +74,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
         if f"~drift_{quantity}" in told:
             x = _drifted(values, quantity, "all", name, share)
             yield f"drift of the {quantity}", partial(_less, channel=quantity, x=x)
-    if "~gain_output" in told:
+    if "~scale_output" in told:
         scale = 1.0 + sum(values.get(f"gain_output.{whose}", 0.0) for whose in SCALED)
         yield "scale of the output position", partial(_rescaled, scale=scale)
     for quantity in ("voltage", "current"):

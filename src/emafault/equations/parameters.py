@@ -213,7 +213,7 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
             out.append(Unit(f"~gain_{quantity}", "form", _shows(quantity), gains, among=among))
         if quantity == "output":
             scales = [Variant([Parameter(f"gain_output.{whose}", 0.0, 0.0, GAIN, "1")]) for whose in position.SCALED]
-            out.append(Unit("~gain_output", "form", _shows(quantity), scales, among=among))
+            out.append(Unit("~scale_output", "form", _shows(quantity), scales, among=among))
     # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere
     warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K") for n in recordings]
     out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=4.0))

@@ -137,11 +137,6 @@ def _drift(fault: Fault) -> Told:
 
 def _gain(fault: Fault) -> Told:
     first = next(iter(fault.linear))
-    if fault.channel == "output":
-        (gain,) = fault.values.values()
-        size = f"{100.0 * abs(gain):.2g} % too {'large' if gain > 0.0 else 'small'}"
-        also = ", and the controller sees it so" * first.endswith("sensor")
-        return Told(f"the output position is recorded {size}{also}", "sensor_curve", "output_angle")
     phase = first.partition(".")[2].partition("@")[0]
     gains = list(fault.values.values())
     if first.startswith(GAIN_NAMES[1]):
@@ -157,6 +152,13 @@ def _gain(fault: Fault) -> Told:
     return Told(f"the gain of the recorded {whose} differs between recordings, {ends}", "drift")
 
 
+def _scale(fault: Fault) -> Told:
+    ((at, gain),) = fault.values.items()
+    size = f"{100.0 * abs(gain):.2g} % too {'large' if gain > 0.0 else 'small'}"
+    also = ", and the controller sees it so" * at.endswith("sensor")
+    return Told(f"the output position is recorded {size}{also}", "sensor_curve", "output_angle")
+
+
 def _lag(fault: Fault) -> Told:
     ((at, amount),) = fault.values.items()
     late = LATE[at.rpartition("_")[2]].format(f"{amount:.2g} intervals")
@@ -165,5 +167,6 @@ def _lag(fault: Fault) -> Told:
 
 KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift, "gain": _gain,
+    "scale": _scale,
     "ambient": _ambient, "controller": _controller,
 }  # fmt: skip
