@@ -257,6 +257,9 @@ def currents(rec: Signals, p: Point) -> Currents:
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
             out.append(i)
+        if rec.derived is not None:
+            for of in (out, shown) if out is means else (out,):
+                of[rec.derived] = -sum((of[j] for j in range(3) if j != rec.derived), Dual(0.0))
         # the true ones add up to nothing: what the three say together is less noisy than each alone
         mean = (out[0] + out[1] + out[2]) * (1.0 / 3.0)
         for j in range(3):

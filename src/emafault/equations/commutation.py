@@ -167,8 +167,9 @@ def noise_bands(state: State) -> list[np.ndarray]:
         ends = a.pole_pairs * rec.noise.angle / width
         off = (ripple_time(a) / rec.interval) ** 2 + (share**2 + (1.0 - share) ** 2) * ends**2
         passing = inside * np.minimum(off, WIDEST) * stays**2
-        # of two of three currents that have their mean taken off, the second times the share
-        sensors = 2.0 / 3.0 * (1.0 - share + share**2) * rec.noise.current**2
+        # of two currents that add up to nothing with the third, the second times the share
+        c, k = rec.current_covariance, STAYS[j]
+        sensors = (c[j, j] + 2.0 * share * c[j, k] + share**2 * c[k, k]) * rec.noise.current**2
         # of a current that changes evenly in the interval, the share has another mean than the whole
         bent = 0.5 * share * (1.0 - share) * change[rows]
         out.append(sensors + passing + bent**2)

@@ -242,7 +242,7 @@ class ReferenceActuator:
             usable = electrical.usable(state, j) & _known(state, name)
             blocks.append(self._block(state, name, r, electrical.noise_bands(state, j), usable))
         for name, equation in OF_STATE.items():
-            if equation is bus and not bus.shows(rec):
+            if (equation is bus and not bus.shows(rec)) or (equation is sensor_current and rec.adds_up):
                 continue
             r = equation.residual(state)
             if equation is commutation:

@@ -11,6 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
+from ..io.derived import adds_up, derived_phase, sensors_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
 from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
@@ -51,6 +52,8 @@ class Signals:
     speed_step: float = 0.0  # rad/s, of a channel whose values lie on a lattice, as the next two
     current_step: float = 0.0  # A
     output_step: float = 0.0  # rad, where it is more than the noise
+    adds_up: bool = False  # whether the recorded currents add up to nothing by construction
+    derived: int | None = None  # phase whose current is less the sum of the others, where it has no sensor
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
@@ -68,12 +71,14 @@ class Signals:
             spiked[rows] = True
             lost |= binary_dilation(spiked)
         counts = spacing(r.output_position)
+        whole = adds_up(r)
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost, stood, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
             lattice_step(r.rotor_speed),
             max(lattice_step(x) for x in r.phase_current.T), counts if counts > noise.position else 0.0,
+            whole, derived_phase([r]) if whole else None,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -104,6 +109,7 @@ class Signals:
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
         self.drawn_from = self
+        self.current_covariance = _covariance(self.derived)  # (phase, phase) of their noise, of a sensor's variance
         self.level = 0.5 * np.abs(self.current).sum(axis=1)
         step = np.abs(np.diff(self.level, append=self.level[-1:]))
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
@@ -168,10 +174,16 @@ class Signals:
         def more(x: np.ndarray, sigma: float) -> np.ndarray:
             return x + sigma * rng.standard_normal(x.shape)
 
+        def of_currents(x: np.ndarray, sigma: float) -> np.ndarray:
+            drawn = more(np.zeros_like(x), sigma)
+            if self.derived is not None:
+                drawn[:, self.derived] -= drawn.sum(axis=1)
+            return x + (drawn - drawn.mean(axis=1, keepdims=True) if self.adds_up else drawn)
+
         s = self.noise
         out = self._changed(
-            voltage=more(self.voltage, s.voltage), current=more(self.current, s.current),
-            current_end=None if self.current_end is None else more(self.current_end, s.current_end),
+            voltage=more(self.voltage, s.voltage), current=of_currents(self.current, s.current),
+            current_end=None if self.current_end is None else of_currents(self.current_end, s.current_end),
             speed_recorded=more(self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
             output=more(self.output, s.position), bus=None if self.bus is None else more(self.bus, s.bus_voltage),
         )  # fmt: skip
@@ -202,6 +214,15 @@ class Signals:
         return out
 
 
+def _covariance(derived: int | None) -> np.ndarray:
+    """(phase, phase) covariance of the noise of currents that add up to nothing, in units of a sensor's variance."""
+    if derived is None:
+        return np.eye(3) - 1.0 / 3.0
+    made = np.delete(np.eye(3), derived, axis=1)
+    made[derived] = -1.0
+    return made @ made.T
+
+
 def passing_time(actuator: ActuatorParameters, current: np.ndarray) -> np.ndarray:
     """Time (s), about, in which a current (A) passes from phase to phase: the bus voltage over both inductances."""
     return 2.0 * actuator.inductance * current / actuator.bus_voltage
@@ -217,7 +238,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has. Where a channel comes in coarse steps most differences of what changes slowly, or evenly, are
+    each of them has, or where it is nothing by construction of phases that are off. Where a channel comes in coarse steps most differences of what changes slowly, or evenly, are
     none, and its noise is that of rounding at least (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
 
@@ -239,12 +260,17 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
         "current": step / np.sqrt(12.0), "angle": min(spacing(r.rotor_angle) for r in recordings) / np.sqrt(12.0),
         "position": min(spacing(r.output_position) for r in recordings) / np.sqrt(12.0),
     }  # fmt: skip
-    current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in recordings]) / np.sqrt(18.0)
-    ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in recordings if r.phase_current_end is not None]
+    summed = [r for r in recordings if not adds_up(r)]
+    if summed:
+        current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in summed]) / np.sqrt(18.0)
+        ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in summed if r.phase_current_end is not None]
+        current_end = robust(ends, step) / np.sqrt(18.0)
+    else:
+        current, current_end = sensors_noise(recordings), sensors_noise(recordings, end=True)
     output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
     speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
     limits = {
-        "angle": angle, "current": current, "current_end": robust(ends, step) / np.sqrt(18.0), "position": output,
+        "angle": angle, "current": current, "current_end": current_end, "position": output,
     }  # fmt: skip
     if lattice_step(fine[0].rotor_speed) == 0.0:
         limits["speed"] = speed

@@ -79,12 +79,23 @@ def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((N m)2)."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
     angle = (a.inertia * s.angle / rec.interval**2) ** 2
-    current = 2.0 * (a.back_emf * s.current / state.inertia) ** 2
     n = rec.size
+    current = _of_pair(state) * (a.back_emf * s.current / state.inertia) ** 2
+    after = np.append(current[1:], current[-1:])
     change = np.abs(np.diff(state.shared, append=state.shared[-1:]))
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     return [
-        6.0 * angle + 0.5 * current + (UNRESOLVED / state.inertia * change) ** 2,
-        np.full(n - 1, -4.0 * angle + 0.25 * current),
+        6.0 * angle + 0.25 * (current + after) + (UNRESOLVED / state.inertia * change) ** 2,
+        -4.0 * angle + 0.25 * after[:-1],
         np.full(n - 2, angle),
     ]
+
+
+def _of_pair(state: State) -> np.ndarray:
+    """(sample,) variance of what the currents' noise makes of the torque, in units of a sensor's times k squared: that
+    of two sensors, or what it is of currents of which one has none."""
+    rec = state.rec
+    if rec.derived is None:
+        return np.full(rec.size, 2.0)
+    shape = np.array([np.broadcast_to(np.asarray(value_of(f)), rec.size) for f in state.conducting])
+    return np.einsum("jn,jk,kn->n", shape, rec.current_covariance, shape)

@@ -1,0 +1,80 @@
+"""Currents of which one has no sensor, or of which the mean was taken off: their sum tells nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emafault.equations.quality import seen
+from emafault.equations.signals import Signals, estimated_noise
+from emafault.io.derived import derived_phase
+
+from .conftest import ACTUATOR, NOISE, machine_of, recorded
+
+
+def less_the_others(recording, phase):
+    """The same where the current of a phase is less the sum of the others."""
+    out = {}
+    for name in ("phase_current", "phase_current_end"):
+        x = getattr(recording, name).copy()
+        x[:, phase] -= x.sum(axis=1)
+        out[name] = x
+    return replace(recording, **out)
+
+
+def less_their_mean(recording):
+    """The same where the currents have their mean taken off."""
+    names = ("phase_current", "phase_current_end")
+    of = {n: getattr(recording, n) for n in names}
+    return replace(recording, **{n: x - x.mean(axis=1, keepdims=True) for n, x in of.items()})
+
+
+@pytest.mark.parametrize("phase", [0, 2])
+def test_a_current_without_a_sensor_is_found_and_the_noise_of_the_others(phase):
+    recordings = [less_the_others(recorded(c, seed=n), phase) for n, c in enumerate(("sine", "reversal", "parabolic"))]
+    assert derived_phase(recordings) == phase
+    found = estimated_noise(recordings, replace(NOISE, current=0.02, current_end=0.05))
+    assert found.current == pytest.approx(NOISE.current, rel=0.1)
+    assert found.current_end == pytest.approx(NOISE.current_end, rel=0.1)
+    signals = Signals.of("a.nc", recordings[0], ACTUATOR, NOISE)
+    assert signals.adds_up and signals.derived == phase
+    more = signals.disturbed(0).current - signals.current
+    assert np.abs(more.sum(axis=1)).max() < 1e-9
+    scatter = np.cov(more.T) / NOISE.current**2
+    assert scatter == pytest.approx(signals.current_covariance, abs=0.15)
+    assert seen(recordings[0])["phase_current"].noise == pytest.approx(NOISE.current, rel=0.15)
+
+
+def test_what_is_stated_goes_before_what_is_seen():
+    stating = replace(less_the_others(recorded("sine"), 1), known={"phase_current": {"derived": "c"}})
+    assert derived_phase([stating]) == 2
+
+
+def test_of_currents_less_their_mean_none_is_derived():
+    recordings = [less_their_mean(recorded(c, seed=n)) for n, c in enumerate(("sine", "reversal"))]
+    assert derived_phase(recordings) is None
+    assert estimated_noise(recordings, NOISE).current == pytest.approx(NOISE.current, rel=0.1)
+    signals = Signals.of("a.nc", recordings[0], ACTUATOR, NOISE)
+    more = signals.disturbed(0).current - signals.current
+    assert np.cov(more.T) / NOISE.current**2 == pytest.approx(signals.current_covariance, abs=0.1)
+
+
+def test_a_sum_that_is_nothing_by_construction_is_no_equation():
+    machine = machine_of({"a.nc": less_the_others(recorded("sine"), 2), "b.nc": recorded("sine")})
+    off = {n: p.off for n, p in machine.parameters.items()}
+    with_sum = {name: {b.equation for b in machine.blocks(off, name)} for name in ("a.nc", "b.nc")}
+    assert with_sum["b.nc"] - with_sum["a.nc"] == {"sensor_current"}
+
+
+def test_an_error_of_a_sensor_is_in_the_derived_current_too():
+    """What the third phase truly carries is less what the others do, whatever their sensors are off by."""
+    plain = recorded("sine")
+    off = replace(plain, **{
+        n: getattr(plain, n) + np.array([0.1, 0.0, 0.0]) for n in ("phase_current", "phase_current_end")
+    })  # fmt: skip
+    machine = machine_of({"a.nc": less_the_others(off, 2), "b.nc": less_the_others(plain, 2)})
+    values = {n: p.off for n, p in machine.parameters.items()}
+    with_offset = {b.equation: b.residual for b in machine.blocks({**values, "current_offset.o_a": 0.1}, "a.nc")}
+    without = {b.equation: b.residual for b in machine.blocks(values, "b.nc")}
+    for equation in ("electrical_a", "electrical_c", "torque"):
+        assert with_offset[equation] == pytest.approx(without[equation], abs=1e-4)
