@@ -115,6 +115,23 @@ def standing_still(r: Recording, n: int) -> Recording:
     return replace(r, **out)
 
 
+def with_two_sensors(r: Recording, n: int) -> Recording:
+    """A third current that is less the sum of the two that are measured."""
+    of = {name: getattr(r, name) for name in ("phase_current", "phase_current_end")}
+    return replace(r, **{name: np.column_stack([x[:, :2], -x[:, :2].sum(axis=1)]) for name, x in of.items()})
+
+
+def held(x: np.ndarray, every: int) -> np.ndarray:
+    """A signal of which every so many samples one is new."""
+    return x[np.arange(len(x)) // every * every]
+
+
+def joined(x: np.ndarray, every: int) -> np.ndarray:
+    """The same with straight lines in between."""
+    at = np.arange(len(x))
+    return np.interp(at, at[::every], x[::every])
+
+
 def bent(i: np.ndarray) -> np.ndarray:
     """Currents of channels that are 1 % low at 5 A, with the square of the current."""
     return i * (1.0 - 0.002 * np.abs(i))
@@ -197,6 +214,9 @@ CHANNELS = {
         itself=("held in sensor_current", "held in sensor_voltage", "held in bus", "held in position"),
         change=standing_still,
     ),
+    "two current sensors": Channel(change=with_two_sensors),
+    "speed new in one sample of five": changed("held in sensor_speed", rotor_speed=lambda w, n: held(w, 5)),
+    "output joined by lines over five": changed("held in position", output_position=lambda x, n: joined(x, 5)),
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
     ),

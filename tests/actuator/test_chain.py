@@ -111,7 +111,7 @@ def test_samples(true):
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
         "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "gain", "drop", "drift", "clipping", "adc_step",
-        "held", "spikes",
+        "held", "hold", "spikes",
     }  # fmt: skip
 
 

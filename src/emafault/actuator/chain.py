@@ -1,7 +1,8 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
 Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
-filter, and drift; the sensors' noise; then spikes, held samples, clipping and the converter's steps.
+filter, and drift; the sensors' noise; then spikes, held samples, a channel slower than the recording, clipping and the
+converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +24,7 @@ RECORDED = {
 }  # fmt: skip
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
-AFTER_NOISE = ("spikes", "held", "clipping", "adc_step")
+AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
 ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
@@ -82,6 +83,9 @@ class Chain:
                 for x in _channels(signals, entry["place"]):
                     if entry["form"] == "clipping":
                         np.clip(x, -entry["level"], entry["level"], out=x)
+                    elif entry["form"] == "hold":
+                        every = int(entry["every"])
+                        x[...] = x[np.arange(len(x)) // every * every]
                     else:
                         x[...] = entry["step"] * np.round(x / entry["step"])
 

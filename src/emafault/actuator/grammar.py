@@ -47,7 +47,7 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
     "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
-    "delay": (0.0, 100.0, "recording intervals"),
+    "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
 SHARE = 0.9  # largest, of what a form adds as a share
@@ -61,7 +61,7 @@ SHAPES = {
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
     "sensor_curve": ("bend",), "gain": ("gain", "growth"), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
-    "spikes": ("share", "level"), "held": ("share",), "clipping": ("level",), "adc_step": ("step",),
+    "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
 OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}

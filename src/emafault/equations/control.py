@@ -101,7 +101,8 @@ def _least_risk(rec) -> int:
     beyond = _calmed(rec.speed_recorded - rec.rate, h)
     impulse = np.zeros(4 * (longest + calm) + 1)
     impulse[len(impulse) // 2] = 1.0
-    noise = [rec.noise.speed * impulse, rec.noise.angle / h * np.diff(impulse, prepend=0.0)]
+    speed = rec.noise.speed * np.sqrt(rec.spacing("speed"))
+    noise = [speed * impulse, rec.noise.angle / h * np.diff(impulse, prepend=0.0)]
     noise = [uniform_filter1d(x, calm) for x in noise]
     risk = {}
     for span in sorted({odd(longest / 2**k) for k in range(longest.bit_length())}):
@@ -290,8 +291,8 @@ def _noise_bands(state: State) -> list[np.ndarray]:
     rate = uniform_filter1d(np.diff(impulse, prepend=0.0) / h, calm)
     slow = uniform_filter1d(impulse, averaged)
     for source, sigma in (
-        (position * slow, s.position),
-        (uniform_filter1d(uniform_filter1d(impulse, calm), span), s.speed),
+        (position * slow, s.position * np.sqrt(rec.spacing("output"))),
+        (uniform_filter1d(uniform_filter1d(impulse, calm), span), s.speed * np.sqrt(rec.spacing("speed"))),
         (a.position_gain * (impulse - slow) + rate - uniform_filter1d(rate, span), s.angle),
     ):
         demand = a.speed_gain * source + a.speed_integral_gain * h * np.cumsum(source)

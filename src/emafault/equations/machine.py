@@ -28,6 +28,8 @@ OF_STATE = {
     "sensor_current": sensor_current, "sensor_speed": sensor_speed, "torque": torque, "position": position, "bus": bus,
     "control": control, "commutation": commutation,
 }  # fmt: skip
+#: equation -> its channel, which may be slower than the recording
+OF_CHANNEL = {"sensor_speed": "speed", "position": "output", "bus": "bus"}
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
 BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and of the torque's, that of the motor
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
@@ -321,12 +323,15 @@ def _by_lag(name: str, lag: float) -> np.ndarray:
 
 
 def _known(state: State, equation: str) -> np.ndarray | bool:
-    """(row,) where nothing that an equation needs is cut off, a spike or not recorded."""
-    lost = state.rec.stalled if equation in ("sensor_speed", "position") else state.rec.lost
+    """(row,) where nothing that an equation needs is cut off, a spike or not recorded, and its channel has a new
+    sample."""
+    rec = state.rec
+    new = rec.new.get(OF_CHANNEL.get(equation, ""), True)
+    lost = rec.stalled if equation in ("sensor_speed", "position") else rec.lost
     if not lost.any():
-        return True
+        return new
     of = rows_of(state, equation)
-    return ~lost if of is None else of(lost) == 0.0
+    return (~lost if of is None else of(lost) == 0.0) & new
 
 
 def _acts(unit: Unit, equation: str) -> bool:

@@ -11,6 +11,8 @@ from ..io.derived import adds_up, sensors_noise
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
+from ..io.updates import updates
+from .signals import MAY_BE_SLOWER
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {
@@ -35,7 +37,7 @@ class Channel:
     ``noise``: standard deviation, robust, from third differences, in which the motion hardly shows, but for the
     inverter's ripple in the voltages; ``step``: of its
     converter, 0 where there is none to be seen; ``held``, ``spikes``, ``clipped``: shares of its samples; ``level``: at
-    which it is cut off.
+    which it is cut off; ``every``: samples from one that is new to the next, of a channel slower than the recording.
     """
 
     noise: float
@@ -44,6 +46,7 @@ class Channel:
     spikes: float = 0.0
     clipped: float = 0.0
     level: float = 0.0
+    every: float = 0.0
 
 
 def seen(recording: Recording) -> dict[str, Channel]:
@@ -52,9 +55,13 @@ def seen(recording: Recording) -> dict[str, Channel]:
     cut = cut_off(recording)
     for channel in CHANNELS:
         values = getattr(recording, channel)
-        if values is not None:
-            lost = cut.get(channel, np.zeros((len(values), 1), bool))
-            out[channel] = _channel(values.reshape(len(values), -1), lost, channel in SUMMED)
+        if values is None:
+            continue
+        lost = cut.get(channel, np.zeros((len(values), 1), bool))
+        every = 0.0
+        if channel in MAY_BE_SLOWER.values() and not (new := updates(values)).all():
+            values, lost, every = values[new], lost[new], float(round(1.0 / np.mean(new), 1))
+        out[channel] = replace(_channel(values.reshape(len(values), -1), lost, channel in SUMMED), every=every)
         if channel in MOTION:
             found = len(without_outliers(values)[1])
             out[channel] = replace(out[channel], spikes=found / len(values) if found >= FEWEST_SPIKES else 0.0)
@@ -98,6 +105,8 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
              "the {0} channel comes in steps of {1:.3g} {2}"),
             ("held", {n: c.held for n, c in mine.items()}, "share", "1",
              "the {0} channel repeats {3:.2g} % of its samples"),
+            ("held", {n: c.every for n, c in mine.items()}, "every", "1",
+             "the {0} channel is slower than the recording: one sample in {1:.3g} is new"),
             ("spikes", {n: c.spikes for n, c in mine.items()}, "share", "1",
              "the {0} channel has spikes in {3:.2g} % of its samples"),
         ):  # fmt: skip
@@ -107,6 +116,8 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
                 entry = _entry(form, equation, words, parameter, value, unit, text, list(found))
                 # how large spikes are is not told
                 term = None if form == "spikes" else {"place": place, "form": form, parameter: float(f"{value:.8g}")}
+                if parameter == "every" and term is not None:
+                    term = {"place": place, "form": "hold", "every": max(2, round(value))}
                 out.append(entry | {"term": term})
     return out
 
@@ -166,6 +177,7 @@ def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[
         for k, share, text in (
             ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
             ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
+            ("every", False, "one sample in {0:.2g} is new"),
         )
         if k in found
     ]  # fmt: skip

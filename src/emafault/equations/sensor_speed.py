@@ -66,8 +66,10 @@ def usable(state: State) -> np.ndarray:
     rec = state.rec
     out = np.ones(rec.size, bool)
     if rec.speed_step > 0.0:
-        changes = np.diff(rec.speed_recorded) != 0.0
-        out[1:-1] = changes[1:] | changes[:-1]
+        new = np.flatnonzero(rec.new.get("speed", out))
+        changes = np.diff(rec.speed_recorded[new]) != 0.0
+        out[:] = False
+        out[new[1:-1]] = changes[1:] | changes[:-1]
         out &= rec.once(("sensor_speed", "sweeps"), lambda: _sweeps(rec))
     out[0] = out[-1] = False
     return out

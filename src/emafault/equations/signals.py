@@ -1,7 +1,7 @@
 """One recording as the equations take it: angles at both ends of each interval, speed, direction, what is masked."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import comb
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..io.derived import adds_up, derived_phase, sensors_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
 from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
+from ..io.updates import across, updates
 from .dual import Dual
 
 SPEED_SPAN = 1.5e-3  # s, over which the angle's rate is averaged where only its sign and size matter
@@ -25,6 +26,8 @@ AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
 STRETCHES = 60  # in a recording
 QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
+#: channels that may be slower than the recording -> variable
+MAY_BE_SLOWER = {"speed": "rotor_speed", "output": "output_position", "bus": "bus_voltage"}
 REST = 2e-3  # rad of the rotor, within which it has not moved yet
 
 
@@ -54,10 +57,15 @@ class Signals:
     output_step: float = 0.0  # rad, where it is more than the noise
     adds_up: bool = False  # whether the recorded currents add up to nothing by construction
     derived: int | None = None  # phase whose current is less the sum of the others, where it has no sensor
+    #: of ``MAY_BE_SLOWER``, the channels that are slower than the recording -> (sample,) bool, their new samples
+    new: dict[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def of(cls, name: str, recording: Recording, actuator: ActuatorParameters, noise: SensorNoise) -> "Signals":
+        new = _new(recording)
         r = calm_motion(recording)
+        if r.bus_voltage is not None and "bus" in new:
+            r = replace(r, bus_voltage=across(r.bus_voltage, new["bus"]))
         stood = stalled(r)
         if stood.any():
             r = bridged(r, stood)
@@ -70,15 +78,15 @@ class Signals:
             spiked = np.zeros(len(r.time), bool)
             spiked[rows] = True
             lost |= binary_dilation(spiked)
-        counts = spacing(r.output_position)
+        counts = spacing(_of_new(r, "output", new))
         whole = adds_up(r)
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost, stood, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
-            lattice_step(r.rotor_speed),
+            lattice_step(_of_new(r, "speed", new)),
             max(lattice_step(x) for x in r.phase_current.T), counts if counts > noise.position else 0.0,
-            whole, derived_phase([r]) if whole else None,
+            whole, derived_phase([r]) if whole else None, new,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -146,6 +154,10 @@ class Signals:
             uniform_filter1d(self.turned, long, mode="nearest"), self.turned,
         )  # fmt: skip
 
+    def spacing(self, channel: str) -> float:
+        """Samples (mean) from one that is new on a channel to the next."""
+        return 1.0 / float(np.mean(self.new[channel])) if channel in self.new else 1.0
+
     def once(self, key: tuple, compute: Callable[[], Any]) -> Any:
         """What does not depend on the point, computed at the first call with this key."""
         if key not in self._once:
@@ -180,12 +192,17 @@ class Signals:
                 drawn[:, self.derived] -= drawn.sum(axis=1)
             return x + (drawn - drawn.mean(axis=1, keepdims=True) if self.adds_up else drawn)
 
+        def of_channel(name: str, x: np.ndarray, sigma: float) -> np.ndarray:
+            drawn = more(np.zeros_like(x), sigma)
+            return x + (across(drawn, self.new[name]) if name in self.new else drawn)
+
         s = self.noise
         out = self._changed(
             voltage=more(self.voltage, s.voltage), current=of_currents(self.current, s.current),
             current_end=None if self.current_end is None else of_currents(self.current_end, s.current_end),
-            speed_recorded=more(self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
-            output=more(self.output, s.position), bus=None if self.bus is None else more(self.bus, s.bus_voltage),
+            speed_recorded=of_channel("speed", self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
+            output=of_channel("output", self.output, s.position),
+            bus=None if self.bus is None else of_channel("bus", self.bus, s.bus_voltage),
         )  # fmt: skip
         out.drawn_from = self
         return out
@@ -214,6 +231,19 @@ class Signals:
         return out
 
 
+def _new(recording: Recording) -> dict[str, np.ndarray]:
+    """New samples by channel, of those that are slower than the recording."""
+    values = {channel: getattr(recording, variable) for channel, variable in MAY_BE_SLOWER.items()}
+    found = {channel: updates(x) for channel, x in values.items() if x is not None}
+    return {channel: rows for channel, rows in found.items() if not rows.all()}
+
+
+def _of_new(recording: Recording, channel: str, new: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The new samples of a channel."""
+    values = getattr(recording, MAY_BE_SLOWER[channel])
+    return values[new[channel]] if channel in new else values
+
+
 def _covariance(derived: int | None) -> np.ndarray:
     """(phase, phase) covariance of the noise of currents that add up to nothing, in units of a sensor's variance."""
     if derived is None:
@@ -238,8 +268,9 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has, or where it is nothing by construction of phases that are off. Where a channel comes in coarse steps most differences of what changes slowly, or evenly, are
-    none, and its noise is that of rounding at least (Widrow and Kollar 2008, Quantization Noise, chapter 1).
+    each of them has, or where it is nothing by construction of phases that are off. Where a channel comes in coarse
+    steps most differences of what changes slowly, or evenly, are none, and its noise is that of rounding at least
+    (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
 
     def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
@@ -256,9 +287,12 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     fine = [r for r in recordings if r.interval < 1.5 * finest]
     angle = min(robust([np.diff(r.rotor_angle, n) for r in fine]) / np.sqrt(comb(2 * n, n)) for n in (3, 4))
     step = max(lattice_step(x) for r in recordings for x in r.phase_current.T)
+    news = [_new(r) for r in recordings]
+    outputs = [_of_new(r, "output", new) for r, new in zip(recordings, news, strict=True)]
+    quick = [(r, new) for r, new in zip(recordings, news, strict=True) if r.interval < 1.5 * finest]
     rounding = {
         "current": step / np.sqrt(12.0), "angle": min(spacing(r.rotor_angle) for r in recordings) / np.sqrt(12.0),
-        "position": min(spacing(r.output_position) for r in recordings) / np.sqrt(12.0),
+        "position": min(spacing(x) for x in outputs) / np.sqrt(12.0),
     }  # fmt: skip
     summed = [r for r in recordings if not adds_up(r)]
     if summed:
@@ -267,12 +301,14 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
         current_end = robust(ends, step) / np.sqrt(18.0)
     else:
         current, current_end = sensors_noise(recordings), sensors_noise(recordings, end=True)
-    output = robust([np.diff(r.output_position, 3) for r in fine]) / np.sqrt(20.0)
-    speed = robust([np.diff(r.rotor_speed, 3) for r in fine]) / np.sqrt(20.0)
+    output, speed = (
+        robust([np.diff(_of_new(r, channel, new), 3) for r, new in quick]) / np.sqrt(20.0)
+        for channel in ("output", "speed")
+    )
     limits = {
         "angle": angle, "current": current, "current_end": current_end, "position": output,
     }  # fmt: skip
-    if lattice_step(fine[0].rotor_speed) == 0.0:
+    if lattice_step(_of_new(fine[0], "speed", quick[0][1])) == 0.0:
         limits["speed"] = speed
     return replace(
         nominal,

@@ -14,6 +14,7 @@ from .lattice import lattice_step
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
+from .updates import across, updates
 
 SLOWEST_INTERVAL = 1e-3  # s
 LEAST_TRAVEL = 0.1  # rad of the rotor; less is standing still
@@ -97,9 +98,17 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
 
 
 def calm_motion(recording: Recording) -> Recording:
-    """A recording whose signals of the motion have no spikes."""
-    angle, speed, output = (without_outliers(getattr(recording, n))[0] for n in MOTION)
+    """A recording whose signals of the motion have no spikes, and straight lines between the new samples of a channel
+    that is slower than the recording."""
+    angle, speed, output = (_calm(getattr(recording, n)) for n in MOTION)
     return replace(recording, rotor_angle=angle, rotor_speed=speed, output_position=output)
+
+
+def _calm(x: np.ndarray) -> np.ndarray:
+    new = updates(x)
+    calm = x.copy()
+    calm[new] = without_outliers(x[new])[0]
+    return across(calm, new)
 
 
 def stalled(recording: Recording) -> np.ndarray:
