@@ -59,6 +59,17 @@ def test_of_currents_less_their_mean_none_is_derived():
     assert np.cov(more.T) / NOISE.current**2 == pytest.approx(signals.current_covariance, abs=0.1)
 
 
+def test_a_channel_that_lags_behind_the_others_is_no_noise_of_the_currents():
+    """The sum of the currents then has of their ripple, many times the noise."""
+    entry = {"place": "current_b", "form": "lag", "lag": 0.3}
+    recordings = [recorded(c, seed=n, unlisted=[entry]) for n, c in enumerate(("sine", "reversal"))]
+    ripple = np.median(np.abs(np.diff(recordings[0].phase_current.sum(axis=1), 2))) / 0.6745 / np.sqrt(18.0)
+    found = estimated_noise(recordings, NOISE)
+    assert ripple > 1.2 * NOISE.current
+    assert found.current == pytest.approx(NOISE.current, rel=0.1)
+    assert found.current_end == pytest.approx(NOISE.current_end, rel=0.1)
+
+
 def test_a_sum_that_is_nothing_by_construction_is_no_equation():
     machine = machine_of({"a.nc": less_the_others(recorded("sine"), 2), "b.nc": recorded("sine")})
     off = {n: p.off for n, p in machine.parameters.items()}
@@ -78,3 +89,11 @@ def test_an_error_of_a_sensor_is_in_the_derived_current_too():
     without = {b.equation: b.residual for b in machine.blocks(values, "b.nc")}
     for equation in ("electrical_a", "electrical_c", "torque"):
         assert with_offset[equation] == pytest.approx(without[equation], abs=1e-4)
+
+
+def test_gains_that_are_alike_are_not_told_by_a_sum_of_which_one_channel_lags():
+    machine = machine_of({"a.nc": recorded("sine", unlisted=[{"place": "current_b", "form": "lag", "lag": 0.3}])})
+    at = {n: p.off for n, p in machine.parameters.items()} | {"lag.current_b_late": 0.3}
+    block = next(b for b in machine.blocks(at, "a.nc") if b.equation == "sensor_current")
+    columns = np.array([block.columns[f"current_gain.g_{j}"] for j in "abc"])
+    assert np.abs(columns.sum(axis=0)).max() < 1e-9 < 1e-3 < np.abs(columns).max()

@@ -18,6 +18,7 @@ from .point import Point, effect_name
 from .signals import Signals
 from .terms import with_hook
 
+OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage or current may lag by itself
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
 GAIN_NAMES = ("gain", "gain_drift")
@@ -39,16 +40,26 @@ def advanced(x: np.ndarray) -> np.ndarray:
     return out
 
 
-def recorded_late(p: Point, channel: str, x: Dual, size: int) -> Dual:
+def _late(p: Point, channel: str, phase: str) -> tuple[Dual, Dual, Dual, Dual]:
+    """Intervals by which a channel comes late and early, is smoothed and filtered, with what a phase has of its own."""
+
+    def of(way: str) -> Dual:
+        all_alike = p(f"lag.{channel}_{way}")
+        own = p(f"lag.{channel}_{phase}_{way}") if phase and way in OF_ONE_PHASE else Dual(0.0)
+        return all_alike + own if own.slopes or own.value else all_alike
+
+    return of("late"), of("early"), of("smoothed"), of("filtered")
+
+
+def recorded_late(p: Point, channel: str, x: Dual, size: int, phase: str = "") -> Dual:
     """What is recorded of a true signal on a channel that lags (in intervals, either sign), smooths or filters."""
-    late, early = p(f"lag.{channel}_late"), p(f"lag.{channel}_early")
+    late, early, smooth, constant = _late(p, channel, phase)
     out = x
     if late.slopes or late.value:
         out = out + late * _changed(x, delayed, late, size)
     if early.slopes or early.value:
         out = out + early * _changed(x, advanced, early, size)
-    for of, operate in (("smoothed", smoothed), ("filtered", filtered)):
-        amount = p(f"lag.{channel}_{of}")
+    for amount, operate in ((smooth, smoothed), (constant, filtered)):
         if amount.slopes or amount.value > LEAST:
             out = through(out, operate, amount, size)
     skew = p(f"skew.{channel}@{p.recording}")
@@ -77,16 +88,16 @@ def _changed(x: Dual, operate: Callable[[np.ndarray], np.ndarray], lag: Dual, si
 
 def late_by(p: Point, channel: str) -> Dual:
     """By how many intervals what changes slowly is recorded late on a channel that lags, smooths or filters."""
-    late, early, smooth, constant = (p(f"lag.{channel}_{of}") for of in ("late", "early", "smoothed", "filtered"))
+    late, early, smooth, constant = _late(p, channel, "")
     return late - early + smooth + constant
 
 
-def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray) -> Dual:
+def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str = "") -> Dual:
     """The true signal from one recorded on a channel that lags, smooths or filters.
 
     ``rate``: change of the recorded signal over an interval, of what is a mean over it from its start to its end.
     """
-    late, early, smooth, constant = (p(f"lag.{channel}_{of}") for of in ("late", "early", "smoothed", "filtered"))
+    late, early, smooth, constant = _late(p, channel, phase)
     out = Dual(x)
     if late.slopes or late.value > LEAST:
         out = out + _ahead(x, late)
@@ -219,7 +230,7 @@ def gain_of_its_own(p: Point, quantity: str, phase: str, rec: Signals) -> Dual |
 
 class Currents(NamedTuple):
     """Currents (A) by phase, (sample,) each: true means and those at the intervals' ends, means that the sensors show,
-    as the regulator sees them, and what the recorded means are beyond those on time."""
+    as the regulator sees them, and what the recorded means are beyond those on time where all are late alike."""
 
     mean: list[Dual]
     end: list[Dual]
@@ -242,7 +253,7 @@ def currents(rec: Signals, p: Point) -> Currents:
     rate = [rates(rec.current[:, j], None if rec.current_end is None else rec.current_end[:, j]) for j in range(3)]
     for n, (source, out) in enumerate(((rec.current, means), (at_end, ends))):
         for j in range(3):
-            on_time = undone(p, "current", source[:, j], rate[j][n])
+            on_time = undone(p, "current", source[:, j], rate[j][n], "abc"[j])
             i = on_time + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
             i = i - drifted(p, "current", "abc"[j], rec)
             if out is means and rounding is not None:
@@ -253,7 +264,7 @@ def currents(rec: Signals, p: Point) -> Currents:
             i = i / gain_of_its_own(p, "current", "abc"[j], rec)
             if out is means:
                 shown.append(i)
-                lag.append(source[:, j] - on_time)
+                lag.append(source[:, j] - undone(p, "current", source[:, j], rate[j][n]))
             for m in with_hook("current"):
                 i = m.current(p.of(effect_name(m)), j, i)
             out.append(i)

@@ -16,6 +16,7 @@ from .acquisition import GAIN_NAMES, drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
 from .position import SCALED
+from .telling_chain import channel_in_words
 
 Undo = Callable[[Recording], Recording]
 #: forms that a voltage of one phase has from its channel: nothing in the machine makes them
@@ -53,8 +54,10 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
             yield words, partial(_less, channel=channel, x=x)
     for quantity in ("voltage", "current", "output", "angle", "bus_voltage"):
-        if f"~lag_{quantity}" in told:
-            yield f"lag of the {quantity} channel", partial(_not_late, quantity=quantity, at=Point(values, name, ()))
+        late = [u for u in told if u == f"~lag_{quantity}" or u.startswith(f"~lag_{quantity}_")]
+        if late:
+            words = f"lag of the {', '.join(channel_in_words(u.removeprefix('~lag_')) for u in sorted(late))}"
+            yield words, partial(_not_late, quantity=quantity, at=Point(values, name, ()))
     for quantity in ("voltage", "current"):
         if f"~curve_{quantity}" in told:
             bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
@@ -164,9 +167,9 @@ def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
 
 
 def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
-    def of(mean: np.ndarray, end: np.ndarray | None = None) -> list[np.ndarray]:
-        known = [x for x in (mean, end) if x is not None]
-        return [np.asarray(undone(at, quantity, x, r).value) for x, r in zip(known, rates(mean, end), strict=False)]
+    def of(mean: np.ndarray, end: np.ndarray | None = None, phase: str = "") -> list[np.ndarray]:
+        known = zip([x for x in (mean, end) if x is not None], rates(mean, end), strict=False)
+        return [np.asarray(undone(at, quantity, x, r, phase).value) for x, r in known]
 
     if quantity == "output":
         return replace(recording, output_position=of(recording.output_position)[0])
@@ -176,9 +179,10 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
         bus = recording.bus_voltage
         return recording if bus is None else replace(recording, bus_voltage=of(bus)[0])
     if quantity == "voltage":
-        return replace(recording, phase_voltage=np.column_stack([of(x)[0] for x in recording.phase_voltage.T]))
+        voltages = zip("abc", recording.phase_voltage.T, strict=True)
+        return replace(recording, phase_voltage=np.column_stack([of(x, phase=j)[0] for j, x in voltages]))
     ends = recording.phase_current_end
-    phases = [of(x, None if ends is None else ends[:, j]) for j, x in enumerate(recording.phase_current.T)]
+    phases = [of(x, None if ends is None else ends[:, j], "abc"[j]) for j, x in enumerate(recording.phase_current.T)]
     means, *at_end = (np.column_stack(x) for x in zip(*phases, strict=True))
     return replace(recording, phase_current=means, phase_current_end=at_end[0] if at_end else None)
 

@@ -78,7 +78,7 @@ def residuals(state: State) -> dict[str, Dual]:
 def recorded(state: State, true: list[Dual]) -> list[Dual]:
     """What is recorded of the true voltages: lag, gains, the star point, the channels' curves, the switches' drop."""
     p, rec, a = state.p, state.rec, state.rec.actuator
-    true = [recorded_late(p, "voltage", v, state.rec.size) for v in true]
+    true = [recorded_late(p, "voltage", v, state.rec.size, j) for j, v in zip("abc", true, strict=True)]
     for m in sorted(with_hook("voltage"), key=lambda m: getattr(m, "RECORDED_LAST", False)):
         true = [m.voltage(p.of(effect_name(m)), j, true) for j in range(3)]
     true = [v * gain_of_its_own(p, "voltage", j, state.rec) for j, v in zip("abc", true, strict=True)]

@@ -145,8 +145,10 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], re
     """
     out = []
     # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
-    only = {"speed": ("early",), "angle": ("late", "early")}
-    for channel in ("voltage", "current", "output", "speed", "angle", "bus_voltage"):
+    phases = [f"{quantity}_{j}" for quantity in ("voltage", "current") for j in PER_PHASE]
+    only = {"speed": ("early",), "angle": ("late", "early"), **dict.fromkeys(phases, acquisition.OF_ONE_PHASE)}
+    channels = ("voltage", "current", "output", "speed", "angle", "bus_voltage", *phases)
+    for channel in channels:
         ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
         variants = [
             Variant(
@@ -157,7 +159,9 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], re
             )
             for way in ways
         ]
-        out.append(Unit(f"~lag_{channel}", "form", _shows(channel), variants, among=6.0, alike=set(MADE) <= set(ways)))
+        shows = _shows(channel.partition("_")[0] if channel in phases else channel)
+        among = float(len(channels))
+        out.append(Unit(f"~lag_{channel}", "form", shows, variants, among=among, alike=set(MADE) <= set(ways)))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from ..io.derived import adds_up, sensors_noise
+from ..io.derived import adds_up, resting_noise
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
@@ -65,7 +65,7 @@ def seen(recording: Recording) -> dict[str, Channel]:
         if channel in MOTION:
             found = len(without_outliers(values)[1])
             out[channel] = replace(out[channel], spikes=found / len(values) if found >= FEWEST_SPIKES else 0.0)
-        if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := sensors_noise([recording])):
+        if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := resting_noise([recording])):
             out[channel] = replace(out[channel], noise=noise)
         if channel in BY_STEPS:
             out[channel] = replace(out[channel], step=0.0, held=0.0)

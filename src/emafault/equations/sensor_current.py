@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .acquisition import bent, drifted, gain_of_its_own, recorded_late
+from .acquisition import OF_ONE_PHASE, bent, drifted, gain_of_its_own, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
@@ -20,9 +20,10 @@ def residual(state: State) -> Dual:
     out = Dual(rec.once(("sum",), lambda: rec.current.sum(axis=1)))
     for j, phase in enumerate("abc"):
         own = gain_of_its_own(p, "current", phase, rec)
-        seen = recorded_late(p, "current", Dual(true[j]) * own, rec.size)
+        seen = Dual(true[j]) * own
         for m in reversed(with_hook("current")):
             seen = _recorded(m, p.of(effect_name(m)), j, seen)
+        seen = _late(state, seen, phase)
         seen = seen + drifted(p, "current", phase, rec)
         for q, other in enumerate("abc"):
             if q != j:
@@ -30,6 +31,24 @@ def residual(state: State) -> Dual:
         seen = seen - bent(p, "current", phase, true[j], rec.actuator)
         out = out - seen
     return out
+
+
+def _late(state: State, seen: Dual, phase: str) -> Dual:
+    """What a channel records of what its sensor shows.
+
+    What a gain has too much goes off the mean that all true currents lose, a third of it by way of each channel: of
+    gains that are alike a sum tells nothing, whichever channel lags.
+    """
+
+    def of(x: Dual, q: str) -> Dual:
+        return recorded_late(state.p, "current", x, state.rec.size, q)
+
+    out = of(seen, phase)
+    if not any(state.p(f"lag.current_{q}_{way}").value for q in "abc" for way in OF_ONE_PHASE):
+        return out
+    columns = {n: Dual(np.broadcast_to(slope, state.rec.size)) for n, slope in seen.slopes.items()}
+    means = {n: sum(np.asarray(of(x, q).value) for q in "abc") / 3.0 for n, x in columns.items()}
+    return Dual(out.value, out.slopes | means)
 
 
 def _recorded(module, p, j: int, true: Dual) -> Dual:

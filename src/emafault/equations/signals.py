@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
-from ..io.derived import adds_up, derived_phase, sensors_noise
+from ..io.derived import adds_up, derived_phase, resting_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
 from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
@@ -268,9 +268,9 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has, or where it is nothing by construction of phases that are off. Where a channel comes in coarse
-    steps most differences of what changes slowly, or evenly, are none, and its noise is that of rounding at least
-    (Widrow and Kollar 2008, Quantization Noise, chapter 1).
+    each of them has, or of phases that are off, where that is less or the sum is nothing by construction. Where a
+    channel comes in coarse steps most differences of what changes slowly, or evenly, are none, and its noise is that of
+    rounding at least (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
 
     def robust(parts: list[np.ndarray], step: float = 0.0) -> float:
@@ -295,12 +295,14 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
         "position": min(spacing(x) for x in outputs) / np.sqrt(12.0),
     }  # fmt: skip
     summed = [r for r in recordings if not adds_up(r)]
-    if summed:
-        current = robust([np.diff(r.phase_current.sum(axis=1), 2) for r in summed]) / np.sqrt(18.0)
-        ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in summed if r.phase_current_end is not None]
-        current_end = robust(ends, step) / np.sqrt(18.0)
-    else:
-        current, current_end = sensors_noise(recordings), sensors_noise(recordings, end=True)
+    currents = [np.diff(r.phase_current.sum(axis=1), 2) for r in summed]
+    ends = [np.diff(r.phase_current_end.sum(axis=1), 2) for r in summed if r.phase_current_end is not None]
+    current, current_end = robust(currents) / np.sqrt(18.0), robust(ends, step) / np.sqrt(18.0)
+    if step == 0.0 or not summed:
+        # where one channel lags behind the others their sum has of the ripple; where a phase is off there is none
+        at_rest = summed or recordings
+        current = min(current, resting_noise(at_rest))
+        current_end = min(current_end, resting_noise(at_rest, end=True))
     output, speed = (
         robust([np.diff(_of_new(r, channel, new), 3) for r, new in quick]) / np.sqrt(20.0)
         for channel in ("output", "speed")

@@ -38,8 +38,7 @@ class Fault:
     @property
     def whose(self) -> str:
         """The channel in words."""
-        quantity, _, phase = (self.channel, "", "") if self.channel in CHANNELS else self.channel.partition("_")
-        return f"{CHANNELS.get(quantity, quantity)} channel" + (f" of phase {phase}" if phase else "")
+        return channel_in_words(self.channel)
 
 
 @dataclass(frozen=True)
@@ -78,6 +77,12 @@ def told_of_chain(
         "equation": equation, "along": told.along, "form": told.form, "parameters": said,
         "sentence": f"{told.where}: {told.says}.",
     }  # fmt: skip
+
+
+def channel_in_words(name: str) -> str:
+    """A channel, of all phases or of one."""
+    quantity, _, phase = (name, "", "") if name in CHANNELS else name.partition("_")
+    return f"{CHANNELS.get(quantity, quantity)} channel" + (f" of phase {phase}" if phase else "")
 
 
 def of_phase(quantity: str, phase: str) -> str:

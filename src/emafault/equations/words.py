@@ -4,7 +4,7 @@ from ..diagnosis.described import Described
 from .acquisition import GAIN_NAMES
 from .point import SEEDED
 from .telling import bare
-from .telling_chain import CHANNELS, LATE, of_phase
+from .telling_chain import CHANNELS, LATE, channel_in_words, of_phase
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
@@ -113,7 +113,7 @@ def _of_group(group: str, short: str) -> str:
         "skew": f"{short} channel is sampled late by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short}",
-        "lag": f"{CHANNELS.get(late, late)} channel {_late(short.rpartition('_')[2])}",
+        "lag": f"{channel_in_words(late)} {_late(short.rpartition('_')[2])}",
         **{
             f"crosstalk_{quantity}": f"{quantity} of phase {phase} in the channel of phase {short[0]}"
             for quantity in ("current", "voltage")

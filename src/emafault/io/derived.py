@@ -24,16 +24,17 @@ def derived_phase(recordings: Sequence[Recording]) -> int | None:
 
     It is what the recordings state, or the phase that has twice the variance of the others while it is off.
     """
-    stated = {r.known.get("phase_current", {}).get("derived") for r in recordings} & {*PHASES}
-    if stated:
-        return PHASES.index(min(stated))
-    variance = resting_noise(recordings) ** 2
+    stated = [str(r.known["phase_current"].get("derived", "")) for r in recordings if "phase_current" in r.known]
+    for phase in PHASES:
+        if phase in stated:
+            return PHASES.index(phase)
+    variance = _resting(recordings) ** 2
     loudest = int(np.argmax(variance))
     others = np.delete(variance, loudest)
     return loudest if np.isfinite(variance).all() and variance[loudest] > ALIKE * others.mean() else None
 
 
-def resting_noise(recordings: Sequence[Recording], end: bool = False) -> np.ndarray:
+def _resting(recordings: Sequence[Recording], end: bool = False) -> np.ndarray:
     """(phase,) standard deviation (A) of the noise of each current, or of those at intervals' ends, while its phase is
     off, robust; infinite where too few samples tell it.
 
@@ -55,10 +56,13 @@ def resting_noise(recordings: Sequence[Recording], end: bool = False) -> np.ndar
     )
 
 
-def sensors_noise(recordings: Sequence[Recording], end: bool = False) -> float:
-    """Standard deviation (A) of the noise of a current's sensor, or of the currents at intervals' ends, in recordings
-    that add up; infinite where too few samples tell it."""
-    noise, derived = resting_noise(recordings, end), derived_phase(recordings)
+def resting_noise(recordings: Sequence[Recording], end: bool = False) -> float:
+    """Standard deviation (A) of the noise of a current's sensor, or of the currents at intervals' ends, while its phase
+    is off; infinite where too few samples tell it. All recordings add up, or none."""
+    noise = _resting(recordings, end)
+    if not adds_up(recordings[0]):
+        return float(noise.mean())
+    derived = derived_phase(recordings)
     if derived is not None:
         return float(np.delete(noise, derived).mean())
     return float(noise.mean()) * np.sqrt(1.5)  # a third of each is gone with their mean
