@@ -126,6 +126,8 @@ def test_the_controller_saw_the_recorded_speed_whatever_dynamics_it_has(command)
 RECORDER = {
     "lag of the output": ({"place": "output", "form": "lag", "lag": 0.6}, {"lag.output_late": 0.6}),
     "lag of the currents": ({"place": "current", "form": "lag", "lag": 0.5}, {"lag.current_late": 0.5}),
+    "lag of the speed": ({"place": "speed", "form": "lag", "lag": 0.7}, {"lag.speed_late": 0.7}),
+    "a speed that is early": ({"place": "speed", "form": "lag", "lag": -0.7}, {"lag.speed_early": 0.7}),
     "lag of one current": ({"place": "current_b", "form": "lag", "lag": 0.3}, {"lag.current_b_late": 0.3}),
     "lag of one voltage": ({"place": "voltage_c", "form": "lag", "lag": -0.4}, {"lag.voltage_c_early": 0.4}),
     "filter of the currents": ({"place": "current", "form": "low_pass", "delay": 0.3}, {"lag.current_filtered": 0.3}),

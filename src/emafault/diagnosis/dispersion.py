@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .constancy import prior_of
+from .constancy import SCATTER, prior_of
 from .evidence import Definite
 from .fit import Bench, Fit
 from .linear import white_rows
@@ -25,7 +25,8 @@ CHANCE = 2.0  # standard deviations of the variance over that expected, up to wh
 
 
 def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
-    """Variance of a unit's score over what the noise's model gives it; 1 where it is not more than by chance.
+    """Variance of a unit's score over what the noise's model gives it; 1 where it is not more than by chance, and by
+    the share of its own size by which a unit may scatter from part to part.
 
     The score is that along the unit's fitted columns, what else is free taken out. Log likelihood ratios of the unit
     are to be divided by it (magnitude adjustment: Ribatet, Cooley and Davison 2012, Statistica Sinica 22, 813).
@@ -35,15 +36,17 @@ def overdispersion(bench: Bench, fit: Fit, model: Model, unit: str) -> float:
     bench : at the point of the fit
     model : a set of the fit that holds the unit
     """
-    found, known = 0.0, []
+    found, parts_known = 0.0, []
     for parts in _scores(bench, fit, model, unit).values():
         s, information, rows = np.array(parts).T
         # the noise that columns and residual share biases every row of an equation alike
         found += float(np.sum((s - rows * (s.sum() / max(rows.sum(), 1.0))) ** 2))
-        known += information.tolist()
-    expected = float(np.sum(known))
-    chance = float(np.sqrt(2.0 * np.sum(np.square(known))))  # of squares of independent Gaussian scores
-    return found / expected if found > expected + CHANCE * chance else 1.0
+        parts_known += information.tolist()
+    known = np.array(parts_known)
+    # the score is per size of the unit, which may scatter by so much of itself all the same
+    scattering = known + (SCATTER * known) ** 2
+    chance = float(np.sqrt(2.0 * np.sum(scattering**2)))  # of squares of independent Gaussian scores
+    return found / float(known.sum()) if found > float(scattering.sum()) + CHANCE * chance else 1.0
 
 
 def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[tuple[float, float, int]]]:

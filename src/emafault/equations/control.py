@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.commands import with_corners
 from ..first_order import filtered
 from . import commutation, position
-from .acquisition import late_by, through
+from .acquisition import late_by, recorded_late, through
 from .dual import Dual, clip, value_of
 from .point import State, effect_name
 from .sensor_speed import seen_speed
@@ -41,7 +41,8 @@ def residual(state: State) -> Dual:
     output = output + position.residual(state).linear(lambda x: _averaged(x, h), rec.size)
     model = seen_speed(state, Dual(rec.speed))
     span = _speed_span(state)
-    beyond = (_calmed(rec.speed_recorded, h) - model).linear(
+    # a speed that comes late or early on its way to the record was in time where the controller took it
+    beyond = (_calmed(rec.speed_recorded, h) - recorded_late(p, "speed", model, rec.size)).linear(
         lambda x: uniform_filter1d(x, span, mode="nearest"), rec.size
     )
     # rounding is the recording's alone, and no more than a step

@@ -144,9 +144,9 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], re
     ``reference``: the recording that gains of all phases alike are told against in the others.
     """
     out = []
-    # that the speed's comes late is in the catalogue; an angle is a sample, and no mean that a logger smooths
+    # that the speed's is filtered is in the catalogue; an angle is a sample, and no mean that a logger smooths
     phases = [f"{quantity}_{j}" for quantity in ("voltage", "current") for j in PER_PHASE]
-    only = {"speed": ("early",), "angle": ("late", "early"), **dict.fromkeys(phases, acquisition.OF_ONE_PHASE)}
+    only = {"speed": ("late", "early"), "angle": ("late", "early"), **dict.fromkeys(phases, acquisition.OF_ONE_PHASE)}
     channels = ("voltage", "current", "output", "speed", "angle", "bus_voltage", *phases)
     for channel in channels:
         ways = only.get(channel, ("late", "early", "smoothed", "filtered"))

@@ -49,8 +49,8 @@ def noise_bands(state: State) -> list[np.ndarray]:
     of_angle = np.array([1.0, -1.0])
     for m in with_hook("response"):
         of_angle = np.convolve(of_angle, m.response(state.p.of(effect_name(m)), rec))
-    early = float(state.p("lag.speed_early").value)
-    of_angle = np.convolve(of_angle, [early, 1.0 - early])
+    late, early = (float(state.p(f"lag.speed_{way}").value) for way in ("late", "early"))
+    of_angle = np.convolve(np.convolve(of_angle, [1.0 - late, late]), [early, 1.0 - early])
     angle = (rec.noise.angle / rec.interval) ** 2 * np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
     rounded = (0.5 * rec.speed_step) ** 2  # next to a change
     white = rec.noise.speed**2 + rounded

@@ -9,6 +9,7 @@ from scipy.special import chdtri, ndtri
 
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..io.joined import joined
 from ..io.recording import PHASES, Recording
 from ..io.sensors import broken, refuse_mistaken
 from ..reconstruction import Features, join_features
@@ -72,6 +73,7 @@ def identify_recordings(
         refuse_mistaken(recording.name, recording, identifier.actuator)
         for variable, rule in broken(recording):
             raise InputError(f"{recording.name}: {variable} {rule}")
+    recordings, reference = ([joined(r)[0] for r in of] for of in (recordings, reference))
     of_reference = [scales_of(r) for r in reference]
     scales = [beside(scales_of(r), of_reference) for r in recordings]
     of_scales = [in_words(r.name, own, LARGEST_MODEL_ERROR) for r, own in zip(recordings, scales, strict=True)]

@@ -14,6 +14,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, shown
 from ..places import kind, refuse_folder
+from .joined import joined
 from .recording import Recording, read_recording, recordings_in
 from .sensors import calm_motion, refuse_mistaken, useless
 
@@ -83,8 +84,14 @@ def check_bench(
         if found:
             variable, rule = found[0]
             warnings.append(_warning("set aside", f"{n}: {variable} {rule}; the recording is set aside", n, variable))
-        else:
-            kept[n] = recording
+            continue
+        kept[n], period = joined(recording)
+        if period > 1:
+            message = (
+                f"{n}: rotor_angle is new in one sample of {period} only; intervals are joined to "
+                f"{1e3 * kept[n].interval:.3g} ms"
+            )
+            warnings.append(_warning("samples", message, n, "rotor_angle"))
     if not kept:
         first = next(iter(recordings))
         rule = warnings[0]["message"].removeprefix(f"{first}: ").removesuffix("; the recording is set aside")
