@@ -121,6 +121,28 @@ def with_two_sensors(r: Recording, n: int) -> Recording:
     return replace(r, **{name: np.column_stack([x[:, :2], -x[:, :2].sum(axis=1)]) for name, x in of.items()})
 
 
+def with_a_loud_current(r: Recording, n: int) -> Recording:
+    """The current of phase b with three more times the noise that it has."""
+    rng = np.random.default_rng(n)
+    of_b = np.array([0.0, 1.0, 0.0])
+    return replace(
+        r, phase_current=r.phase_current + 0.02 * rng.standard_normal((len(r.time), 3)) * of_b,
+        phase_current_end=r.phase_current_end + 0.06 * rng.standard_normal((len(r.time), 3)) * of_b,
+    )  # fmt: skip
+
+
+def with_averaged_noise(r: Recording, n: int) -> Recording:
+    """A speed whose noise is a moving average, as that of a differentiator."""
+    noise = np.random.default_rng(n).standard_normal(len(r.time) + 4)
+    return replace(r, rotor_speed=r.rotor_speed + 0.3 * np.convolve(noise, np.ones(5), "valid") / np.sqrt(5.0))
+
+
+def in_turn(i: np.ndarray, n: int) -> np.ndarray:
+    """Currents of phases b and c that are sampled by 0.1 and 0.2 intervals late."""
+    before = np.concatenate([i[:1], i[:-1]])
+    return i + np.array([0.0, 0.1, 0.2]) * (before - i)
+
+
 def held(x: np.ndarray, every: int) -> np.ndarray:
     """A signal of which every so many samples one is new."""
     return x[np.arange(len(x)) // every * every]
@@ -217,6 +239,15 @@ CHANNELS = {
     "two current sensors": Channel(change=with_two_sensors),
     "speed new in one sample of five": changed("held in sensor_speed", rotor_speed=lambda w, n: held(w, 5)),
     "output joined by lines over five": changed("held in position", output_position=lambda x, n: joined(x, 5)),
+    "one current's noise fourfold": Channel(change=with_a_loud_current),
+    "current of phase b late by 0.3 intervals": Channel(
+        entry("current_b", "lag", lag=0.3), ("lag in sensor_current",)
+    ),
+    "currents sampled one after the other": changed(
+        "lag in sensor_current", phase_current=in_turn, phase_current_end=in_turn
+    ),
+    "speed's noise averaged over five samples": Channel(noisier(0.02, "speed"), change=with_averaged_noise),
+    "angle new in one sample of five": changed(rotor_angle=lambda x, n: held(x, 5)),
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
     ),

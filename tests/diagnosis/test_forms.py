@@ -219,6 +219,14 @@ def test_a_level_that_wanders_does_not_look_like_a_constant():
     assert steady.wander == 0.0 and max(steady.wandering) < 5.0
 
 
+@pytest.mark.parametrize("span", [3, 5, 10])
+def test_noise_that_is_a_moving_average_does_not_wander(span):
+    """What an autoregression of the spectrum without dips lacks of it, a level must not be found to take up."""
+    noise = np.random.default_rng(span).standard_normal(4000 + span - 1)
+    weights = coloured(np.convolve(noise, np.ones(span), "valid") / np.sqrt(span), np.ones(4000, bool))
+    assert weights.wander == 0.0 and max(weights.wandering[1:]) < 0.0
+
+
 def test_wandering_is_asked_of_all_recordings_together():
     def bench(*levels):
         rng = np.random.default_rng(6)

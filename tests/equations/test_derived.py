@@ -7,7 +7,7 @@ import pytest
 
 from emafault.equations.quality import seen
 from emafault.equations.signals import Signals, estimated_noise
-from emafault.io.derived import derived_phase
+from emafault.io.currents_noise import derived_phase, shares_of_noise
 
 from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
@@ -68,6 +68,23 @@ def test_a_channel_that_lags_behind_the_others_is_no_noise_of_the_currents():
     assert ripple > 1.2 * NOISE.current
     assert found.current == pytest.approx(NOISE.current, rel=0.1)
     assert found.current_end == pytest.approx(NOISE.current_end, rel=0.1)
+
+
+def test_a_sensor_with_more_noise_than_the_others_is_told_by_its_phase_at_rest():
+    rng = np.random.default_rng(5)
+    plain = [recorded(c, seed=n) for n, c in enumerate(("sine", "reversal"))]
+    louder = [
+        replace(r, phase_current=r.phase_current + rng.normal(0.0, 1.0, (len(r.time), 3)) * [0.0, 0.015, 0.0])
+        for r in plain
+    ]
+    true = np.array([NOISE.current**2, NOISE.current**2 + 0.015**2, NOISE.current**2])
+    assert shares_of_noise(louder) == pytest.approx(true / true.mean(), rel=0.2)
+    assert (shares_of_noise(plain) == 1.0).all() and (shares_of_noise(louder, end=True) == 1.0).all()
+    assert estimated_noise(louder, NOISE).current == pytest.approx(np.sqrt(true.mean()), rel=0.1)
+    signals = Signals.of("a.nc", louder[0], ACTUATOR, estimated_noise(louder, NOISE))
+    more = signals.disturbed(0).current - signals.current
+    assert more.std(axis=0) == pytest.approx(np.sqrt(true), rel=0.15)
+    assert np.diag(signals.current_covariance)[1] > 2.0 * np.diag(signals.current_covariance)[0]
 
 
 def test_a_sum_that_is_nothing_by_construction_is_no_equation():

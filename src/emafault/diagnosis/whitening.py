@@ -207,18 +207,23 @@ def filtered(rows: np.ndarray, weights: Weights) -> np.ndarray:
 def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True) -> Weights:
     """The model of what is left of white rows: an autoregression and its variance; where it may be ``changing``, how
     its level wanders and how its variance comes and goes as well."""
-    n = int(keep.sum())
+    n = max(1, int(keep.sum()))
     best, chosen = np.inf, Weights(keep, np.zeros(0), np.ones(len(white)))
     scores = []
     for wander in WANDERING if changing else (0.0,):
         trial = Weights(keep, np.zeros(0), np.ones(len(white)), wander)
         left = filtered(white[:, None], trial)[:, 0]
-        coefficients, variance, score = autoregression(left, keep)
+        coefficients, variance = autoregression(left, keep)
+        trial = replace(trial, coefficients=coefficients)
+        # of what it leaves of these rows, not of the spectrum without dips: else a level that is none takes up what an
+        # autoregression then lacks
+        power = float(np.sum(filtered(white[:, None], trial)[keep, 0] ** 2))
+        score = n * np.log(power / n) + len(coefficients) * np.log(n) if power > 0.0 else np.inf
         scores.append(score)
         score += (wander > 0.0) * np.log(n)
         if score < best:
             best = score
-            chosen = replace(trial, coefficients=coefficients, variance=np.full(len(white), max(variance, 1e-6)))
+            chosen = replace(trial, variance=np.full(len(white), max(variance, 1e-6)))
     if not changing or not np.isfinite(scores).all():
         return chosen
     chosen = replace(chosen, wandering=tuple(0.5 * (scores[0] - np.array(scores))))
@@ -257,15 +262,15 @@ def _without_dips(r: np.ndarray) -> np.ndarray:
     return np.concatenate([[spectrum.mean()], spectrum @ cosine / GRID])
 
 
-def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, innovation variance, and BIC."""
+def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
+    """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
     top = min(ORDER, n // 20)
     lags = min(LAGS, n // 4)
     r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(lags + 1)])
     if r[0] <= 0.0:
-        return np.zeros(0), 1.0, np.inf
+        return np.zeros(0), 1.0
     r = _without_dips(r)
     best, chosen, variance = n * np.log(r[0]), np.zeros(0), r[0]
     a, error = np.zeros(0), r[0]
@@ -276,4 +281,4 @@ def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float
         score = n * np.log(error) + order * np.log(n)
         if score < best:
             best, chosen, variance = score, a.copy(), error
-    return chosen, float(variance), float(best)
+    return chosen, float(variance)

@@ -201,8 +201,9 @@ def _conducts(rec, j: int) -> np.ndarray:
 def noise_bands(state: State, j: int) -> list[np.ndarray]:
     """Diagonals of the noise's covariance (V2): white, and that of differenced end currents and angles."""
     p, rec, a, s = state.p, state.rec, state.rec.actuator, state.rec.noise
-    summed = 2.0 if j == rec.derived else 1.0  # variance of a current that is less the sum of two
-    white: Number = s.voltage**2 + summed * (a.resistance * s.current) ** 2
+    # a current that is less the sum of two has the noise of both
+    of_mean, of_end = (2.0 if j == rec.derived else float(shares[j]) for shares in rec.shares)
+    white: Number = s.voltage**2 + of_mean * (a.resistance * s.current) ** 2
     if drop := sum(float(p(f"drop.{of}").value) for of in ("voltage", f"voltage_{'abc'[j]}")):
         turned = direction(rec.current[:, j], float(p("drop.turn").value))
         white = white + (TURNING * drop * (1.0 - turned**2)) ** 2
@@ -221,6 +222,6 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
         ends = (state.inductance[j] / rec.interval / lengths) ** 2 * np.where(runs.crosses, across, between)
         unknown = np.where(runs.crosses, 0.0, UNKNOWN * of(np.asarray(value_of(state.rise[j])))) ** 2
         return [(white + 2.0 * of(angle) / lengths) / lengths + ends + unknown]
-    differenced = summed * (a.inductance / rec.interval * s.current_end) ** 2 + angle
+    differenced = of_end * (a.inductance / rec.interval * s.current_end) ** 2 + angle
     before = np.concatenate([differenced[:1], differenced[:-1]])
     return [white + differenced + before, -differenced[:-1]]

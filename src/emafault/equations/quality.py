@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from ..io.derived import adds_up, resting_noise
+from ..io.currents_noise import adds_up, resting_noise
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers

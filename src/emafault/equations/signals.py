@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
-from ..io.derived import adds_up, derived_phase, resting_noise
+from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
 from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
@@ -57,6 +57,8 @@ class Signals:
     output_step: float = 0.0  # rad, where it is more than the noise
     adds_up: bool = False  # whether the recorded currents add up to nothing by construction
     derived: int | None = None  # phase whose current is less the sum of the others, where it has no sensor
+    #: (phase,) variance of each sensor's noise over the mean of all, of the currents and of those at intervals' ends
+    shares: tuple[np.ndarray, np.ndarray] = (np.ones(3), np.ones(3))
     #: of ``MAY_BE_SLOWER``, the channels that are slower than the recording -> (sample,) bool, their new samples
     new: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -79,14 +81,15 @@ class Signals:
             spiked[rows] = True
             lost |= binary_dilation(spiked)
         counts = spacing(_of_new(r, "output", new))
-        whole = adds_up(r)
+        whole, step = adds_up(r), max(lattice_step(x) for x in r.phase_current.T)
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost, stood, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
             lattice_step(_of_new(r, "speed", new)),
-            max(lattice_step(x) for x in r.phase_current.T), counts if counts > noise.position else 0.0,
-            whole, derived_phase([r]) if whole else None, new,
+            step, counts if counts > noise.position else 0.0,
+            whole, derived_phase([r]) if whole else None,
+            (shares_of_noise([r]), shares_of_noise([r], end=True)) if step == 0.0 else (np.ones(3), np.ones(3)), new,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -117,7 +120,8 @@ class Signals:
         self.acceleration = np.gradient(slow, h)
         self.rows_from = self
         self.drawn_from = self
-        self.current_covariance = _covariance(self.derived)  # (phase, phase) of their noise, of a sensor's variance
+        # (phase, phase) of the currents' noise, in units of a sensor's variance
+        self.current_covariance = _covariance(self.derived, self.shares[0])
         self.level = 0.5 * np.abs(self.current).sum(axis=1)
         step = np.abs(np.diff(self.level, append=self.level[-1:]))
         self.current_change = np.maximum(step, np.concatenate([step[:1], step[:-1]]))
@@ -186,8 +190,8 @@ class Signals:
         def more(x: np.ndarray, sigma: float) -> np.ndarray:
             return x + sigma * rng.standard_normal(x.shape)
 
-        def of_currents(x: np.ndarray, sigma: float) -> np.ndarray:
-            drawn = more(np.zeros_like(x), sigma)
+        def of_currents(x: np.ndarray, sigma: float, shares: np.ndarray) -> np.ndarray:
+            drawn = more(np.zeros_like(x), sigma) * np.sqrt(shares)
             if self.derived is not None:
                 drawn[:, self.derived] -= drawn.sum(axis=1)
             return x + (drawn - drawn.mean(axis=1, keepdims=True) if self.adds_up else drawn)
@@ -198,8 +202,9 @@ class Signals:
 
         s = self.noise
         out = self._changed(
-            voltage=more(self.voltage, s.voltage), current=of_currents(self.current, s.current),
-            current_end=None if self.current_end is None else of_currents(self.current_end, s.current_end),
+            voltage=more(self.voltage, s.voltage), current=of_currents(self.current, s.current, self.shares[0]),
+            current_end=None if self.current_end is None
+            else of_currents(self.current_end, s.current_end, self.shares[1]),
             speed_recorded=of_channel("speed", self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
             output=of_channel("output", self.output, s.position),
             bus=None if self.bus is None else of_channel("bus", self.bus, s.bus_voltage),
@@ -244,10 +249,12 @@ def _of_new(recording: Recording, channel: str, new: Mapping[str, np.ndarray]) -
     return values[new[channel]] if channel in new else values
 
 
-def _covariance(derived: int | None) -> np.ndarray:
-    """(phase, phase) covariance of the noise of currents that add up to nothing, in units of a sensor's variance."""
+def _covariance(derived: int | None, shares: np.ndarray) -> np.ndarray:
+    """(phase, phase) covariance of the noise of currents that add up to nothing, in units of a sensor's variance; of
+    sensors with ``shares`` (phase,) of it."""
     if derived is None:
-        return np.eye(3) - 1.0 / 3.0
+        less_mean = np.eye(3) - 1.0 / 3.0
+        return (less_mean * shares) @ less_mean
     made = np.delete(np.eye(3), derived, axis=1)
     made[derived] = -1.0
     return made @ made.T

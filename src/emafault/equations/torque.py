@@ -93,9 +93,9 @@ def noise_bands(state: State) -> list[np.ndarray]:
 
 def _of_pair(state: State) -> np.ndarray:
     """(sample,) variance of what the currents' noise makes of the torque, in units of a sensor's times k squared: that
-    of two sensors, or what it is of currents of which one has none."""
+    of two sensors, or what it is where these differ or one has none."""
     rec = state.rec
-    if rec.derived is None:
+    if rec.derived is None and (rec.shares[0] == 1.0).all():
         return np.full(rec.size, 2.0)
     shape = np.array([np.broadcast_to(np.asarray(value_of(f)), rec.size) for f in state.conducting])
     return np.einsum("jn,jk,kn->n", shape, rec.current_covariance, shape)
