@@ -1,13 +1,14 @@
 """Currents of which one has no sensor, or of which the mean was taken off: their sum tells nothing."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from emafault.actuator.sensors import SensorNoise
 from emafault.equations.quality import seen
 from emafault.equations.signals import Signals, estimated_noise
-from emafault.io.currents_noise import derived_phase, shares_of_noise
+from emafault.io.currents_noise import adds_up, derived_phase, shares_of_noise
 
 from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
@@ -114,3 +115,8 @@ def test_gains_that_are_alike_are_not_told_by_a_sum_of_which_one_channel_lags():
     block = next(b for b in machine.blocks(at, "a.nc") if b.equation == "sensor_current")
     columns = np.array([block.columns[f"current_gain.g_{j}"] for j in "abc"])
     assert np.abs(columns.sum(axis=0)).max() < 1e-9 < 1e-3 < np.abs(columns).max()
+
+
+def test_currents_without_noise_add_up_by_themselves():
+    none = SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0))
+    assert not adds_up(recorded("sine", noise=none)) and adds_up(less_the_others(recorded("sine"), 1))
