@@ -11,6 +11,7 @@ from emafault.diagnosis.model import Unit
 from emafault.diagnosis.sets import Choice, Model
 from emafault.equations import held_out
 from emafault.equations.held_out import _less
+from emafault.equations.how_far import SETTINGS
 
 from .conftest import machine_of, recorded
 
@@ -44,6 +45,20 @@ def test_a_coefficient_that_multiplies_noise_loses_nothing_by_that(ladder):
     before, own, rows = electrical(fixed, values, corrected=True)
     assert part - own > 4.0 * np.sqrt(0.05 * rows)
     assert before - own < raw - part < raw - own
+
+
+def test_the_controller_s_settings_are_refitted_where_they_are_no_part_of_the_gap(ladder):
+    """A gain that the exploring recordings hardly tell is frozen far from where it is."""
+    fixed, values = ladder
+    off = values | {"controller.position_gain": 0.9 * values["controller.position_gain"]}
+
+    def mean_square(equation, settings):
+        found = [w for w in fixed.blocks(off, settings=settings) if w.equation == equation]
+        return sum(w.gram[-1, -1] for w in found) / sum(w.count for w in found)
+
+    assert mean_square("control", ()) > 3.0
+    assert mean_square("control", SETTINGS) < 1.5
+    assert mean_square("torque", SETTINGS) == pytest.approx(mean_square("torque", ()), rel=0.01)
 
 
 def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():

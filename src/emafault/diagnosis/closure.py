@@ -36,12 +36,13 @@ class Ladder:
         also: Collection[str] = (),
         inserted: Inserted | None = None,
         corrected: bool = False,
+        settings: Collection[str] = (),
     ) -> list[White]:
         """Whitened blocks at frozen values, what is each recording's own refitted; with remainders if asked.
 
         ``also`` names parameters of the model, of which those of a recording are refitted too; ``inserted`` takes the
         remainders and own forms of a fitted set out of what is left. ``corrected`` gives each block the noise's part of
-        its misfit.
+        its misfit. ``settings`` are parameters of all recordings that each is refitted in as well.
         """
         out: list[White] = []
         of_each = {n.rsplit("@", 1)[0] for n in also if "@" in n}
@@ -53,6 +54,7 @@ class Ladder:
                 if n.endswith(own) and not n.startswith("controller.timing")
                 and (n in self.nuisances or n.removesuffix(own) in of_each)
             ]  # fmt: skip
+            free += [n for n in settings if n in self.nuisances]
             mine, weights = {n: p.off for n, p in self.parameters.items()} | dict(values), self.carried[recording]
             for _ in range(STEPS):
                 blocks = self.machine.blocks(mine, recording, wanted=[*free, *shaped])

@@ -14,9 +14,12 @@ from ..diagnosis.sets import Choice, Model
 from ..io.recording import Recording
 from . import electrical
 from .held_out import Explored, HeldOut
-from .parameters import FAULTS
+from .parameters import FAULTS, GAINS
 from .point import SEEDED
 from .telling import Z
+
+#: what the controller's owner may set is no part of a gap, and recordings set aside may tell what the others do not
+SETTINGS = [f"controller.{name}" for name in (*GAINS, "speed_limit")]
 
 
 def null(bench: Bench, fit: Fit) -> Bench:
@@ -53,13 +56,13 @@ def shrinks(
     nominal_unit = null(explored.bench, fit)
     recalibrated = {**off, **nominal_unit.values()}
     nominal = {n: recalibrated[n] if n.split("@")[0].removeprefix(SEEDED) in FAULTS else v for n, v in off.items()}
-    base = ladder.blocks(recalibrated, remainders=True)
+    base = ladder.blocks(recalibrated, remainders=True, settings=SETTINGS)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(
         (_inserted(explored, m, recalibrated) for m in models),
         key=lambda found: rms(found[0]),
     )
-    at_nominal = ladder.blocks(nominal, remainders=True)
+    at_nominal = ladder.blocks(nominal, remainders=True, settings=SETTINGS)
     units = {u.id: u for u in explored.bench.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
@@ -76,7 +79,8 @@ def shrinks(
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
             own = {p.name: after[p.name] for p in form.parameters}
-            entry["closed"] = closed(rms(base), rms(ladder.blocks(recalibrated | own, also=list(own))), 1.0, count)
+            alone = ladder.blocks(recalibrated | own, also=list(own), settings=SETTINGS)
+            entry["closed"] = closed(rms(base), rms(alone), 1.0, count)
     return {
         "signal": signal,
         "features": features,
@@ -103,7 +107,8 @@ def _inserted(
     inserted = explored.bench.inserted(model, explored.fit.normal)
     after = {**recalibrated, **inserted.values}
     mine = [n for n in model.deviations if is_parameter(n)]
-    return explored.ladder.blocks(after, remainders=True, also=mine, inserted=inserted), after
+    blocks = explored.ladder.blocks(after, remainders=True, also=mine, inserted=inserted, settings=SETTINGS)
+    return blocks, after
 
 
 def _feature_ladder(
