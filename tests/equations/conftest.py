@@ -23,6 +23,7 @@ COMMANDS = {
     "reversal": {"amplitude": 0.04, "speed": 0.25},
     "sine": {"amplitude": 0.02, "frequency": 2.0},
 }
+EVERY = 5  # samples, of which one is new on a channel slower than the recording
 STEP = {"step": {"amplitude": 0.012, "time": 0.02}}
 
 
@@ -55,6 +56,17 @@ def recorded(
 def in_steps(recording, steps):
     """The same where channels come in coarse steps, by variable."""
     return replace(recording, **{n: step * np.round(getattr(recording, n) / step) for n, step in steps.items()})
+
+
+def held(x):
+    """A channel of which one sample in ``EVERY`` is new, held in between."""
+    return x[np.arange(len(x)) // EVERY * EVERY]
+
+
+def lines(x):
+    """The same with straight lines in between."""
+    at = np.arange(len(x))
+    return np.interp(at, at[::EVERY], x[::EVERY])
 
 
 def machine_of(recordings, exclude=()):

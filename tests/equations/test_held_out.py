@@ -11,7 +11,7 @@ from emafault.diagnosis.model import Unit
 from emafault.diagnosis.sets import Choice, Model
 from emafault.equations import held_out
 from emafault.equations.held_out import _less
-from emafault.equations.how_far import SETTINGS
+from emafault.equations.how_far import CONTROLLER_SETTINGS
 
 from .conftest import machine_of, recorded
 
@@ -57,8 +57,8 @@ def test_the_controller_s_settings_are_refitted_where_they_are_no_part_of_the_ga
         return sum(w.gram[-1, -1] for w in found) / sum(w.count for w in found)
 
     assert mean_square("control", ()) > 3.0
-    assert mean_square("control", SETTINGS) < 1.5
-    assert mean_square("torque", SETTINGS) == pytest.approx(mean_square("torque", ()), rel=0.01)
+    assert mean_square("control", CONTROLLER_SETTINGS) < 1.5
+    assert mean_square("torque", CONTROLLER_SETTINGS) == pytest.approx(mean_square("torque", ()), rel=0.01)
 
 
 def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():

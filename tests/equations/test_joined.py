@@ -6,27 +6,15 @@ import numpy as np
 import pytest
 
 from emafault.io.bench import check_bench
-from emafault.io.joined import joined, slower_angle
+from emafault.io.joined import joined
 
-from .conftest import ACTUATOR, recorded
-
-EVERY = 5
-
-
-def held(x):
-    return x[np.arange(len(x)) // EVERY * EVERY]
-
-
-def lines(x):
-    at = np.arange(len(x))
-    return np.interp(at, at[::EVERY], x[::EVERY])
+from .conftest import ACTUATOR, EVERY, held, lines, recorded
 
 
 @pytest.mark.parametrize("how", [held, lines])
 def test_intervals_end_where_the_angle_is_new(how):
     plain = recorded("sine")
     slow = replace(plain, rotor_angle=how(plain.rotor_angle), rotor_speed=held(plain.rotor_speed))
-    assert slower_angle(slow) == EVERY and slower_angle(plain) == 1
     found, period = joined(slow)
     assert period == EVERY and found.interval == pytest.approx(EVERY * plain.interval)
     ends = np.arange(EVERY, len(plain.time), EVERY)
@@ -49,3 +37,14 @@ def test_a_bench_says_so():
     assert len(bench.recordings["a.nc"].time) == len(plain.time) // EVERY - 1
     said = [w["message"] for w in bench.warnings if w["kind"] == "samples"]
     assert said == ["a.nc: rotor_angle is new in one sample of 5 only; intervals are joined to 1 ms"]
+
+
+def test_what_is_joined_is_checked_as_it_is_then():
+    plain, other = recorded("sine"), recorded("reversal")
+    slow = replace(plain, rotor_angle=held(plain.rotor_angle))
+    bench = check_bench("bench", {"a.nc": slow, "b.nc": slow}, ACTUATOR)
+    assert list(bench.recordings) == ["a.nc"]
+    ten = replace(other, rotor_angle=other.rotor_angle[np.arange(len(other.time)) // 10 * 10])
+    bench = check_bench("bench", {"a.nc": plain, "b.nc": ten}, ACTUATOR)
+    assert list(bench.recordings) == ["a.nc"]
+    assert any("interval of 2 ms" in w["message"] for w in bench.warnings)

@@ -8,25 +8,14 @@ import pytest
 from emafault.equations.quality import seen, told
 from emafault.equations.signals import Signals, estimated_noise
 
-from .conftest import ACTUATOR, NOISE, machine_of, recorded
-
-EVERY = 5
-
-
-def held(x):
-    return x[np.arange(len(x)) // EVERY * EVERY]
-
-
-def joined(x):
-    at = np.arange(len(x))
-    return np.interp(at, at[::EVERY], x[::EVERY])
+from .conftest import ACTUATOR, EVERY, NOISE, held, lines, machine_of, recorded
 
 
 def slower(recording, how, *variables):
     return replace(recording, **{v: how(getattr(recording, v)) for v in variables})
 
 
-@pytest.mark.parametrize("how", [held, joined])
+@pytest.mark.parametrize("how", [held, lines])
 def test_noise_and_residuals_are_those_of_the_new_samples(how):
     plain = [recorded(c, seed=n) for n, c in enumerate(("sine", "reversal"))]
     slow = [slower(r, how, "rotor_speed", "output_position") for r in plain]

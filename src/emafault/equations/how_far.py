@@ -19,7 +19,7 @@ from .point import SEEDED
 from .telling import Z
 
 #: what the controller's owner may set is no part of a gap, and recordings set aside may tell what the others do not
-SETTINGS = [f"controller.{name}" for name in (*GAINS, "speed_limit")]
+CONTROLLER_SETTINGS = [f"controller.{name}" for name in (*GAINS, "speed_limit")]
 
 
 def null(bench: Bench, fit: Fit) -> Bench:
@@ -56,13 +56,13 @@ def shrinks(
     nominal_unit = null(explored.bench, fit)
     recalibrated = {**off, **nominal_unit.values()}
     nominal = {n: recalibrated[n] if n.split("@")[0].removeprefix(SEEDED) in FAULTS else v for n, v in off.items()}
-    base = ladder.blocks(recalibrated, remainders=True, settings=SETTINGS)
+    base = ladder.blocks(recalibrated, remainders=True, settings=CONTROLLER_SETTINGS)
     mine = [n for n in model.deviations if is_parameter(n)]
     best, after = min(
         (_inserted(explored, m, recalibrated) for m in models),
         key=lambda found: rms(found[0]),
     )
-    at_nominal = ladder.blocks(nominal, remainders=True, settings=SETTINGS)
+    at_nominal = ladder.blocks(nominal, remainders=True, settings=CONTROLLER_SETTINGS)
     units = {u.id: u for u in explored.bench.units}
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
@@ -79,7 +79,7 @@ def shrinks(
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
             own = {p.name: after[p.name] for p in form.parameters}
-            alone = ladder.blocks(recalibrated | own, also=list(own), settings=SETTINGS)
+            alone = ladder.blocks(recalibrated | own, also=list(own), settings=CONTROLLER_SETTINGS)
             entry["closed"] = closed(rms(base), rms(alone), 1.0, count)
     return {
         "signal": signal,
@@ -107,7 +107,7 @@ def _inserted(
     inserted = explored.bench.inserted(model, explored.fit.normal)
     after = {**recalibrated, **inserted.values}
     mine = [n for n in model.deviations if is_parameter(n)]
-    blocks = explored.ladder.blocks(after, remainders=True, also=mine, inserted=inserted, settings=SETTINGS)
+    blocks = explored.ladder.blocks(after, remainders=True, also=mine, inserted=inserted, settings=CONTROLLER_SETTINGS)
     return blocks, after
 
 

@@ -36,8 +36,9 @@ def residual(state: State) -> Dual:
 def _late(state: State, seen: Dual, phase: str) -> Dual:
     """What a channel records of what its sensor shows.
 
-    What a gain has too much goes off the mean that all true currents lose, a third of it by way of each channel: of
-    gains that are alike a sum tells nothing, whichever channel lags.
+    The true currents are the recorded ones over their gains, less their mean, so that a change of one gain shows in the
+    sum as the mean of what the three channels make of it: a gain common to all currents cannot be identified from
+    their sum, whichever channel lags.
     """
 
     def of(x: Dual, q: str) -> Dual:

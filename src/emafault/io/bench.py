@@ -79,17 +79,18 @@ def check_bench(
     warnings: list[dict] = []
     for n, recording in recordings.items():
         refuse_mistaken(shown[n], recording, actuator)
+        recording, period = joined(recording)
         copy = next((o for o, other in kept.items() if _same(recording, other)), None)
         found = (("time", f"holds the same data as {copy}"),) if copy else tuple(useless(recording, actuator))
         if found:
             variable, rule = found[0]
             warnings.append(_warning("set aside", f"{n}: {variable} {rule}; the recording is set aside", n, variable))
             continue
-        kept[n], period = joined(recording)
+        kept[n] = recording
         if period > 1:
             message = (
                 f"{n}: rotor_angle is new in one sample of {period} only; intervals are joined to "
-                f"{1e3 * kept[n].interval:.3g} ms"
+                f"{1e3 * recording.interval:.3g} ms"
             )
             warnings.append(_warning("samples", message, n, "rotor_angle"))
     if not kept:

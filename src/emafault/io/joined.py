@@ -5,18 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from .recording import Recording
-from .updates import updates
+from .updates import APART, updates
 
 AT_END = ("phase_current_end", "rotor_angle", "output_position", "commanded_position", "time")
 MEANS = ("phase_voltage", "phase_current", "rotor_speed", "bus_voltage")
-REGULAR = 0.98  # of the new samples, that lie a whole number of periods apart
-
-
-def slower_angle(recording: Recording) -> int:
-    """Intervals from one new sample of the angle to the next; 1 where it is as fast as the recording, or irregular."""
-    at = np.flatnonzero(updates(recording.rotor_angle))
-    period = int(np.median(np.diff(at))) if len(at) > 1 else 1
-    return period if period > 1 and np.bincount(at % period).max() >= REGULAR * len(at) else 1
 
 
 def joined(recording: Recording) -> tuple[Recording, int]:
@@ -25,11 +17,12 @@ def joined(recording: Recording) -> tuple[Recording, int]:
     Means are those over the joined intervals, but for a channel that is held for as long as the angle, whose new sample
     counts.
     """
-    period = slower_angle(recording)
-    if period == 1:
-        return recording, 1
     new = np.flatnonzero(updates(recording.rotor_angle))
-    first = int(np.bincount(new % period).argmax())
+    period = int(np.median(np.diff(new))) if len(new) > 1 else 1
+    places = np.bincount(new % period)
+    if period == 1 or places.max() < APART * len(new):
+        return recording, 1
+    first = int(places.argmax())
     ends = np.arange(first, len(recording.time), period)
     ends = ends[ends >= period - 1]
 
@@ -46,4 +39,4 @@ def joined(recording: Recording) -> tuple[Recording, int]:
 def _held_as_long(x: np.ndarray, ends: np.ndarray) -> bool:
     """Whether a channel has other values where the angle is new, and nowhere else."""
     changed = 1 + np.flatnonzero(np.diff(x.reshape(len(x), -1)[:, 0]) != 0.0)
-    return len(changed) > 0 and bool(np.mean(np.isin(changed, ends)) > REGULAR)
+    return len(changed) > 0 and bool(np.mean(np.isin(changed, ends)) > APART)
