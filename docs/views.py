@@ -401,6 +401,13 @@ FORM_VIEWS = {
         "zero before 0.5 s and a constant after",
         "It comes at one time of the recording, and stays.",
     ),
+    "pulse": FormView(
+        "time",
+        {"time": 0.3, "until": 0.6},
+        (FORM_SIZE,),
+        "a constant from 0.3 s to 0.6 s, zero before and after",
+        "It comes at one time of the recording and goes at another, as a load that a bench applies for a while.",
+    ),
     "function": FormView(
         "speed",
         {"coordinate": 0.0, "from": -160.0, "to": 160.0},

@@ -75,6 +75,7 @@ CASES = [
     ("frequency", {"frequency": 41.7}, (0.2, 0.1), 0),
     ("bump", {"centre": 2.1, "width": 0.25}, (0.4,), 0),
     ("step_change", {"time": 0.31}, (0.5,), 1),
+    ("pulse", {"time": 0.21, "until": 0.34}, (0.5,), 0),
     ("function", {"coordinate": 0.0, "from": -150.0, "to": 150.0}, (0.3, -0.2, 0.1, 0.2, -0.2), 0),
     ("power", {"exponent": 2.0}, (0.4,), 1),
     ("memory", {"source": 0.0, "time_constant": 0.12}, (0.05,), 1),

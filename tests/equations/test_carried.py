@@ -20,7 +20,8 @@ from .conftest import ACTUATOR, COMMANDS, SPEC, machine_of
 
 SHAPES = {
     "order": {"order": 2.4}, "frequency": {"frequency": 40.0}, "bump": {"centre": 6.0, "width": 0.4},
-    "step_change": {"time": 0.30003}, "power": {"exponent": 2.0}, "memory": {"source": 0.0, "time_constant": 0.1},
+    "step_change": {"time": 0.30003}, "pulse": {"time": 0.20003, "until": 0.35003}, "power": {"exponent": 2.0},
+    "memory": {"source": 0.0, "time_constant": 0.1},
     "function": {"coordinate": 0.0, "from": -100.0, "to": 150.0}, "travel": {"length": 2.0},
 }  # fmt: skip
 

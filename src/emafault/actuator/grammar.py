@@ -45,7 +45,8 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "growth": (*ANY, ""), "at_start": (*ANY, ""), "at_end": (*ANY, ""), "drop": (*ANY, "V"),
     "turn": (_SMALLEST, 1e6, "A"), "step": (_SMALLEST, 1e6, ""), "level": (_SMALLEST, 1e6, ""),
     "order": (_SMALLEST, 1000.0, "1"), "frequency": (_SMALLEST, 1e4, "Hz"), "phase": (*ANY, "rad"),
-    "time": (0.0, 3600.0, "s"), "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
+    "time": (0.0, 3600.0, "s"), "until": (0.0, 3600.0, "s"),
+    "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
@@ -54,7 +55,8 @@ SHARE = 0.9  # largest, of what a form adds as a share
 #: form -> its parameters; SI. What they mean: ``unlisted.SHAPES`` and ``chain``
 SHAPES = {
     "order": ("amplitude", "order", "phase"), "frequency": ("amplitude", "frequency", "phase"),
-    "step_change": ("jump", "time"), "power": ("at_100_rad_s", "exponent"), "bump": ("depth", "centre", "width"),
+    "step_change": ("jump", "time"), "pulse": ("jump", "time", "until"), "power": ("at_100_rad_s", "exponent"),
+    "bump": ("depth", "centre", "width"),
     "memory": ("gain", "time_constant", "source"), "function": ("along", "from", "to", "values"),
     "travel": ("amplitude", "length"),
 }  # fmt: skip

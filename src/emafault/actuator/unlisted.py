@@ -21,6 +21,7 @@ SHAPES = {
     "order": ("amplitude", "order", "phase"),  # amplitude cos(order theta + phase)
     "frequency": ("amplitude", "frequency", "phase"),  # amplitude cos(2 pi frequency t + phase)
     "step_change": ("jump", "time"),
+    "pulse": ("jump", "time", "until"),
     "power": ("at_100_rad_s", "exponent"),  # at_100_rad_s (|w| / 100)^exponent
     "bump": ("depth", "centre", "width"),  # Gaussian about an angle of the turn; width is its standard deviation
     "memory": ("gain", "time_constant", "source"),  # gain times its source filtered; a place in SOURCES
@@ -34,7 +35,7 @@ SHAPES = {
 TABLE_STEP = 1e-3  # s between entries of the table
 CUBIC = 4 * (KNOTS - 1)  # coefficients of a spline
 _WIDTH = 2 + 3 + CUBIC
-ORDER, FREQUENCY, STEP, POWER, BUMP, MEMORY, SWEEP, BURST, TRAVEL, WANDER, FUNCTION = range(len(SHAPES))
+ORDER, FREQUENCY, STEP, PULSE, POWER, BUMP, MEMORY, SWEEP, BURST, TRAVEL, WANDER, FUNCTION = range(len(SHAPES))
 TWO_PI = 2.0 * np.pi
 HOLD = 5.0e-5  # s, that a term is held at most
 HELD_OVER = 0.2  # rad of a wave, or of a bump's width, that it is held over
@@ -121,6 +122,8 @@ def acting(row, t, theta, w, current, turned, temperature, memory, table):
         return a * np.cos(TWO_PI * b * t + c)
     if shape == STEP:
         return a if t >= b else 0.0
+    if shape == PULSE:
+        return a if b <= t < c else 0.0
     if shape == POWER:
         return a * (abs(w) / 100.0) ** b
     if shape == BUMP:
@@ -192,8 +195,10 @@ def longest_hold(terms, t, w):
             hold = min(hold, RIPPLE_HOLD)
         if rate * hold > HELD_OVER:
             hold = max(HELD_OVER / rate, SHORTEST_HOLD)
-        if (shape == STEP or shape == BURST) and t < b < t + hold:
+        if (shape == STEP or shape == PULSE or shape == BURST) and t < b < t + hold:
             hold = b - t
+        if shape == PULSE and t < c < t + hold:
+            hold = c - t
     return hold
 
 

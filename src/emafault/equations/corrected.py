@@ -20,7 +20,7 @@ from .telling_chain import channel_in_words
 
 Undo = Callable[[Recording], Recording]
 #: forms that a voltage of one phase has from its channel: nothing in the machine makes them
-OF_THE_CHANNEL = ("frequency", "step_change")
+OF_THE_CHANNEL = ("frequency", "step_change", "pulse")
 
 
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:

@@ -142,7 +142,7 @@ def _word(form: Described) -> str:
         return "drift"
     if form.word == "function" and form.driver:
         return "coefficient"
-    return {"power": "function", "travel": "memory"}.get(form.word, form.word)
+    return {"power": "function", "travel": "memory", "pulse": "step_change"}.get(form.word, form.word)
 
 
 def picture(form: Described, found: Mapping[str, list[float]], actuator: ActuatorParameters) -> dict[str, Any]:
@@ -179,6 +179,8 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         says = f"{what} is {height} {more} about {of('centre')} of the turn, over {of('width')}"
     elif form.word == "step_change":
         says = f"{what} jumps by {of('jump')} at {of('time')}"
+    elif form.word == "pulse":
+        says = f"{what} changes by {of('jump')} from {of('time')} to {of('until')}"
     elif form.word == "power":
         says = (
             f"{what} goes with the speed to the power of {found['exponent'][0]:.3g}, {of('at_100_rad_s')} at 100 rad/s"

@@ -65,7 +65,7 @@ EFFECTS = {
 }  # fmt: skip
 FORMS = {
     "order": "wave along the rotor angle", "frequency": "oscillation", "bump": "bump", "step_change": "step",
-    "function": "function", "power": "power of the speed", "memory": "low-pass filtered part",
+    "pulse": "pulse", "function": "function", "power": "power of the speed", "memory": "low-pass filtered part",
     "travel": "drag that builds up",
 }  # fmt: skip
 _PASSING = {

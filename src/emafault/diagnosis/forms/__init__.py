@@ -17,8 +17,9 @@ told(coefficients) : what a reader wants of the coefficients: name -> value
 
 from types import ModuleType
 
-from . import bump, frequency, function, memory, order, power, step_change, travel
+from . import bump, frequency, function, memory, order, power, pulse, step_change, travel
 
 FORMS: dict[str, ModuleType] = {
-    m.__name__.rsplit(".", 1)[-1]: m for m in (order, frequency, bump, step_change, function, power, memory, travel)
+    m.__name__.rsplit(".", 1)[-1]: m
+    for m in (order, frequency, bump, step_change, pulse, function, power, memory, travel)
 }

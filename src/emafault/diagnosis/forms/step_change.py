@@ -1,6 +1,6 @@
 """A jump at a time, the same in all recordings."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -18,13 +18,42 @@ FINER = 6
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
     """(1, row) zero before, one after."""
-    return (np.asarray(coordinates["time"]) > shape["time"])[None].astype(float)
+    return after(coordinates, np.array([shape["time"]]))
 
 
-def _values(left: Left, driver: int, times: np.ndarray) -> np.ndarray:
-    """(time,) approximate log Bayes factors, a constant of the driver apart."""
-    after = np.concatenate([[-1.0], times])[:, None]
-    return singly(*beside_first(*left.products(lambda b: b.coordinates["time"] > after, driver)))
+def after(coordinates: Mapping, times: np.ndarray) -> np.ndarray:
+    """(time, row) the part of each row after some times: of a sample none or all, of a mean over an interval that of
+    the interval, of an acceleration, which a second difference weighs with a triangle of two, that of its area."""
+    intervals = coordinates.get("averaged", 0)
+    away = (np.asarray(coordinates["time"]) - times[:, None]) / _spacing(coordinates)
+    if intervals == 0:
+        return (away > 0.0).astype(float)
+    if intervals == 1:
+        return np.clip(away + 0.5, 0.0, 1.0)
+    rise = 0.5 * (1.0 - np.minimum(np.abs(away), 1.0)) ** 2
+    return np.where(away < 0.0, rise, 1.0 - rise)
+
+
+def _spacing(coordinates: Mapping) -> float:
+    """Time from row to row (s)."""
+    return float(np.median(np.diff(coordinates["time"])))
+
+
+def nearer(left: Left, at: float, columns: Callable[[Mapping, np.ndarray], np.ndarray], driver: int):
+    """The best of some times near one, their standard deviation and its approximate log Bayes factor, a constant of the
+    driver apart; ``columns`` (time, row) of a block's coordinates and times."""
+    width, finest = left.longest / CELLS, min(_spacing(b.coordinates) for b in left.blocks)
+    while True:
+        times = at + width * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+
+        def of(b, times=times):
+            return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, times)])
+
+        values = singly(*beside_first(*left.products(of, driver)))
+        at, width = float(times[int(np.argmax(values))]), width / FINER
+        if width < finest:
+            weight = np.exp(values - values.max())
+            return at, float(np.sqrt(weight @ (times - at) ** 2 / weight.sum())) + width, float(values.max())
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
@@ -37,14 +66,8 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The time."""
-    at, width = shape["time"], left.longest / CELLS
-    for _ in range(2):
-        times = at + width * np.linspace(-1.0, 1.0, 2 * FINER + 1)
-        values = _values(left, driver, times)
-        at, width = float(times[int(np.argmax(values))]), width / FINER
-    weight = np.exp(values - values.max())
-    deviation = float(np.sqrt(weight @ (times - at) ** 2 / weight.sum())) + width
-    return [Found((("time", at, deviation, "s"),), float(values.max()), float(CELLS * FINER))]
+    at, deviation, value = nearer(left, shape["time"], after, driver)
+    return [Found((("time", at, deviation, "s"),), value, float(CELLS * FINER))]
 
 
 def told(values: np.ndarray) -> dict[str, float]:
