@@ -1,9 +1,12 @@
 """Which listed effect a described form is much like."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from emafault.diagnosis.described import Described, another_form_of, curve, with_forms
+from emafault.diagnosis.describing import FEWEST, MOST
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Search
@@ -100,6 +103,31 @@ def test_what_a_listed_effect_could_be_is_no_form(sizes, found):
     bench._describe("first")
     assert {d.id for d in bench.described if d.word == "frequency"} == found
     assert all(d.values["frequency"] == pytest.approx(21.3, abs=0.1) for d in bench.described if d.id in found)
+
+
+@pytest.mark.parametrize("left", [True, False])
+def test_several_forms_are_one_remainder_unless_they_leave_none(monkeypatch, left):
+    """Scans go on while the leading set is full of what they propose; what ends at a remainder is taken back."""
+    bench = Bench(Wave((0.0, 0.0)), Wave.recordings)
+    form = Described("~f", "frequency", "torque", 0, (("frequency", 21.3, 0.01, "Hz"),), 1.0, 1.0)
+
+    def describe(mark):
+        bench.describe([*bench.described, replace(form, id=f"~f_{mark}")])
+        bench.point["load.T"] += 1.0
+        return True
+
+    ended = ("whites", "normal", "search")
+    monkeypatch.setattr(bench, "_describe", describe)
+    monkeypatch.setattr(bench, "_count_scanned", lambda _: bench.scanned)
+    monkeypatch.setattr(bench, "_keep_likely", lambda _: None)
+    monkeypatch.setattr(bench, "_renewed", lambda: ())
+    monkeypatch.setattr(bench, "_until_still", lambda *_: ended)
+    monkeypatch.setattr(bench, "_with_none_to_leave", lambda *_: ended)
+    monkeypatch.setattr(bench, "_lacking", lambda _: left)
+    found = bench._with_all_described(*"wns")
+    more = 0 if left else MOST - FEWEST
+    assert found == (tuple("wns") if left else ended)
+    assert (bench.scanned, len(bench.described), bench.point["load.T"]) == (FEWEST + more, more, more)
 
 
 @pytest.mark.parametrize(("size", "bins"), [(0.5, 30), (0.055, 15), (0.02, 8)])

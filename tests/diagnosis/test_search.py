@@ -44,14 +44,15 @@ def test_causes_are_found_behind_a_remainder_that_stands_in_for_them(kind, count
     assert search.ranked()[0].log_posterior - stand_in.log_posterior > 12.0  # and not by a hair
 
 
-@pytest.mark.parametrize("proposed", [False, True])
-def test_what_needs_three_forms_of_a_scan_is_a_remainder(proposed):
+@pytest.mark.parametrize(("proposed", "most"), [(False, 2), (True, 2), (True, 3)])
+def test_a_set_has_no_more_forms_of_scans_than_it_may(proposed, most):
     names = ["one", "two", "three"]
-    reduced = marginalise(Normal(names, np.eye(3), np.zeros(3), 0.0), [], np.zeros(0), np.zeros(0), np.zeros(3))
+    normal = Normal(names, 1e4 * np.eye(3), np.full(3, -1e4), 3e4)  # each is as surely there
+    reduced = marginalise(normal, [], np.zeros(0), np.zeros(0), np.zeros(3))
     units = [Unit(n, "form", ("torque",), [Variant([])], proposed=proposed) for n in names]
-    search = Search(reduced, units, {(n, 0): _candidate([k], 1.0, [n]) for k, n in enumerate(names)})
-    assert np.isfinite(search.log_prior([(n, 0) for n in names[:2]]))
-    assert np.isfinite(search.log_prior([(n, 0) for n in names])) == (not proposed)
+    candidates = {(n, 0): _candidate([k], 1.0, [n]) for k, n in enumerate(names)}
+    search = Search(reduced, units, candidates, scanned=most)
+    assert len(search.run()[0].units) == (most if proposed else 3)
 
 
 def test_what_an_own_form_takes_up_of_another_cause_is_given_back():

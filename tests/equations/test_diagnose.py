@@ -126,6 +126,41 @@ def test_what_a_controller_does_with_its_command_is_told_and_no_gap_of_the_machi
     assert gain["low"] < 100.0 < gain["high"]
 
 
+def beside_cogging(entries):
+    """Four recordings of a unit with cogging and something unlisted, diagnosed."""
+    return verdict_of({
+        f"r{n}.nc": recorded(c, COGGING, (0.0,) * 5 + (dT,), seed=n, theta_0=theta_0, unlisted=entries)
+        for n, (c, dT, theta_0) in enumerate(PLANS)
+    })  # fmt: skip
+
+
+def test_all_waves_of_a_bearing_are_described():
+    """A scan proposes one of them; while a set is full of what scans propose, another scan may find the next."""
+    waves = [(3.57, 0.004), (7.14, 0.003), (10.71, 0.002)]
+    entries = [
+        {"place": "torque", "form": "order", "order": order, "amplitude": size, "phase": order} for order, size in waves
+    ]
+    verdict = beside_cogging(entries)
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    assert {d["form"] for d in verdict["discovered"]} == {"order"}
+    told = sorted(
+        (d["parameters"]["order"]["value"], d["parameters"]["amplitude"]["value"]) for d in verdict["discovered"]
+    )
+    assert [order for order, _ in told] == pytest.approx([order for order, _ in waves], rel=1e-3)
+    assert [size for _, size in told] == pytest.approx([size for _, size in waves], rel=0.1)
+
+
+def test_a_load_that_comes_and_goes_is_one_pulse():
+    verdict = beside_cogging([{"place": "torque", "form": "pulse", "jump": 0.03, "time": 0.2, "until": 0.45}])
+    assert verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = verdict["discovered"]
+    assert (told["form"], told["equation"], told["along"]) == ("step_change", "torque", "time")
+    assert told["parameters"]["time"]["value"] == pytest.approx(0.2, abs=2e-4)
+    assert told["parameters"]["until"]["value"] == pytest.approx(0.45, abs=2e-4)
+    assert told["parameters"]["jump"]["value"] == pytest.approx(0.03, rel=0.05)
+    assert "from 0.2 s to 0.45 s" in told["sentence"]
+
+
 def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     late = {}
     for name, r in bench(COGGING).items():

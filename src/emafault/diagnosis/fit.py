@@ -1,12 +1,15 @@
 """The fit of a bench: linearise, search, relinearise at what leads, until it stands still."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import expit
 
-from .described import Described, proposed, refined, with_forms
+from .described import Described
+from .describing import FEWEST, MOST, Describing
 from .evidence import Normal
 from .linear import White
 from .linearisation import Carried, Task
@@ -15,7 +18,6 @@ from .naming import NAMED
 from .point import Place
 from .search import NEAR, Search
 from .sets import OTHER_FORM, Choice, Model
-from .settling import Settling
 
 ROUNDS = 3
 LINEAR = 0.01  # of what an effect explains, that a linear model may be wrong by
@@ -23,10 +25,7 @@ FIRST = 2  # rounds of the search before remainders and own forms
 LEAVES = 1  # times that a member of the leading set may fall at a closer look
 SINGLES = 3  # causes that a search may begin at in the place of what leads
 CARRYING = 6  # units that carry their own form
-SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
-SPREAD = 3  # recordings that they are of at least
-
-
+CHANGING = ("carried", "sizes", "closer", "looked_at", "leading", "sound", "scanned")  # in a search, beside its point
 NOTHING = Model(())  # the unit alone
 
 
@@ -42,13 +41,20 @@ class Fit:
     search: Search
 
 
-class Bench(Settling):
+@dataclass(frozen=True)
+class State:
+    """All that a search changes."""
+
+    place: Place
+    forms: Sequence[Described]
+    rest: Mapping[str, Any]
+
+
+class Bench(Describing):
     """A bench with the search over its sets."""
 
-    describing = True  # whether recordings are long enough to tell forms and the colour of the noise from each other
-
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
-        super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
+        super().__init__(machine, recordings, processes)
         self.looked_at: tuple[str, ...] | None = None  # units of the set at which the weights were taken
         self.leading: dict[bool, list[tuple[Choice, ...]]] = {}  # sets that the last search ended at, by ``sound``
 
@@ -89,7 +95,31 @@ class Bench(Settling):
         if self._carry_own_forms(search) or self.described != before:
             self.looked_at = search.ranked()[0].units
             whites, normal = self._renewed()
-        return self._with_none_to_leave(whites, normal)
+        return self._with_all_described(*self._with_none_to_leave(whites, normal))
+
+    def _with_all_described(
+        self, whites: list[White], normal: Normal, search: Search
+    ) -> tuple[list[White], Normal, Search]:
+        """Scan on while the leading set has as many forms of scans as sets may have, which are one more each time; if
+        that ends at a set with a remainder where they act, where it began: what several forms do not describe is a
+        remainder beside few.
+        """
+        fit, begun = (whites, normal, search), self._state()
+        while self.scanned < MOST and self._count_scanned(search) == self.scanned:
+            before = self.described
+            self._keep_likely(search)
+            if not self._describe(f"led_{self.scanned}"):
+                self.describe(before)
+                break
+            self.scanned += 1
+            whites, normal, search = self._until_still(*self._renewed(), FIRST, False)
+        if self.scanned == FEWEST:
+            return fit
+        whites, normal, search = self._with_none_to_leave(*self._renewed())
+        if not self._lacking(search):
+            return whites, normal, search
+        self._restore(begun)
+        return fit
 
     def _with_none_to_leave(self, whites: list[White], normal: Normal) -> tuple[list[White], Normal, Search]:
         whites, normal, search = self._until_still(whites, normal, ROUNDS)
@@ -105,7 +135,7 @@ class Bench(Settling):
         self.describe(bench.described)
         self.point |= {n: v for n, v in fit.values.items() if n in self.point}
         self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
-        self.sound, self.leading = bench.sound, dict(bench.leading)
+        self.sound, self.leading, self.scanned = bench.sound, dict(bench.leading), bench.scanned
         self.carried |= fit.carried
         # until they are fitted, what the others' fit leaves of further recordings is their noise
         as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
@@ -127,66 +157,6 @@ class Bench(Settling):
             if best.units == before.units:
                 break
         return whites, renewed, search
-
-    def describe(self, forms: Sequence[Described]) -> None:
-        """Take described forms among the candidate causes."""
-        if tuple(forms) == self.described:
-            return
-        self.machine = with_forms(self.machine, forms)
-        self.parameters = dict(self.machine.parameters)
-        self.units = list(self.machine.units)
-        self.point = {n: p.off for n, p in self.parameters.items()} | self.point
-        if self.workers is not None:
-            self.workers.tell("describe", tuple(forms))
-
-    def _describe(self, mark: str) -> bool:
-        """Look through what the present point leaves for forms; whether there are any."""
-        if not self.describing:
-            return False
-        names, workers = self._looked_through(), self._workers()
-        carried = {n: self.carried[n] for n in names}
-        # what stands out is what no listed effect could be, whether or not it acts yet
-        values, free = self.values(), self._free({u.id for u in self.units if u.kind in LISTED} | self.on)
-        parts = [(values, names, carried, free, mark, k, workers.count) for k in range(workers.count)]
-        found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
-        found = [f for f in found if not any(f.same(g) for g in self.described)]
-        self.describe([*self.described, *found])
-        return bool(found)
-
-    def _free(self, units: Collection[str]) -> dict[str, tuple[float, float]]:
-        """What is free beside a form: nuisances and parameters of some units, by name of a column."""
-        names = [p.name for u in self.units if u.id in units for v in self.active(u) for p in v.parameters]
-        return self._full_prior(names, self.columns()[1])
-
-    def _keep_likely(self, search: Search) -> None:
-        """Let go of described forms that no likely set has."""
-        ranked = search.ranked()
-        likely = {u for m in ranked if m.log_posterior > ranked[0].log_posterior - NEAR for u in m.units}
-        self.describe([f for f in self.described if f.id in likely])
-
-    def _looked_through(self) -> list[str]:
-        """As many recordings as a scan needs."""
-        out: list[str] = []
-        samples = 0
-        for name in [*self.recordings[::2], *self.recordings[1::2]]:
-            if samples > SCANNED and len(out) >= SPREAD:
-                break
-            samples += self.machine.samples(name)
-            out.append(name)
-        return out
-
-    def _refine(self, model: Model) -> bool:
-        """Give described forms of a set, fitted at the present point, the shape that is best there; whether any
-        changes."""
-        mine = [f for f in self.described if f.id in model.units]
-        if not mine:
-            return False
-        values, free = self.values(), self._free(self.on)
-        blocks = [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=set(free))]
-        better = {f.id: refined(self.machine, f, blocks, self.carried, self.point, free) for f in mine}
-        before = self.described
-        self.describe([better.get(f.id, f) for f in before])
-        return self.described != before
 
     def _begun_at_single(self, normal: Normal) -> bool:
         """Move the point to the best single cause where that, at its own optimum, is better than what the linear model
@@ -262,7 +232,8 @@ class Bench(Settling):
         units, candidates = self.candidates(reduced)
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
-        search = self.searching(reduced, units, candidates, {u: c for u, c in self.closer.items() if u not in self.on})
+        closer = {u: c for u, c in self.closer.items() if u not in self.on}
+        search = self.searching(reduced, units, candidates, closer, self.scanned)
         search.run(self.leading.get(self.sound, ()))
         self.leading[self.sound] = search.leading()
         return search
@@ -284,6 +255,14 @@ class Bench(Settling):
                     names = self.names_of(choice)
                     self.sizes[choice.unit] = {n: model.deviations[n] - self.prior(n)[2] for n in names}
         return bool(self.sizes)
+
+    def _state(self) -> State:
+        return State(self.here(), self.described, {name: copy(getattr(self, name)) for name in CHANGING})
+
+    def _restore(self, state: State) -> None:
+        self.describe(state.forms)
+        self.go_to(state.place)
+        vars(self).update(state.rest)
 
     # ---- sets, each at its own optimum
     def _ahead(self, model: Model, normal: Normal) -> float:

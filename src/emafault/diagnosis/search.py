@@ -33,7 +33,9 @@ class Search:
         units: Sequence[Unit],
         candidates: dict[tuple[str, int], Candidate],
         corrections: Mapping[str, float] | None = None,
+        scanned: float = np.inf,
     ):
+        """``scanned``: forms proposed by scans that a set is extended to, at most."""
         self.reduced = reduced
         self.units = {u.id: u for u in units}
         self.candidates = candidates
@@ -45,6 +47,7 @@ class Search:
         self.priors: dict[tuple[tuple[str, int], float], tuple[np.ndarray, ...]] = {}
         self.tempering = 1.0
         self.corrections = corrections or {}
+        self.scanned = scanned
         self.prior = SetPrior(units, candidates, self.size_prior)
         flat = list(candidates.values())
         self.flat = (
@@ -195,6 +198,11 @@ class Search:
         """Log prior probability of a set."""
         return self.prior.log_of(members)
 
+    def _may_be(self, members: Sequence[tuple[str, int]]) -> bool:
+        """Whether the search may look at a set."""
+        few = sum(self.units[u].proposed for u, _ in members) <= self.scanned
+        return few and bool(np.isfinite(self.log_prior(members)))
+
     # ---- the search
     def run(self, begun: Sequence[tuple[Choice, ...]] = (), rounds: int = 8) -> list[Model]:
         """Every set looked at, most probable first; ``begun``: sets that led where this search goes on from."""
@@ -205,7 +213,7 @@ class Search:
         for among in (causes, set(self.candidates)):
             for members in [(), *every]:
                 inside = tuple(m for m in members if m in among)
-                if np.isfinite(self.log_prior(inside)):
+                if self._may_be(inside):
                     self.fit(inside)
             self._climb(rounds, among)
         # a unit in another form may take up what is another's, beside which its own form is the better again
@@ -241,7 +249,7 @@ class Search:
             inside = tuple((c.unit, c.variant) for c in model.choices)
             widths = {(c.unit, c.variant): c.width for c in model.choices}
             for m in self.candidates:
-                if m[0] not in {u for u, _ in inside} and np.isfinite(self.log_prior((*inside, m))):
+                if m[0] not in {u for u, _ in inside} and self._may_be((*inside, m)):
                     self.fit((*inside, m), widths)
         return self.ranked()[0] is not before[0]
 
@@ -266,7 +274,7 @@ class Search:
         others = {m for m in among if m[0] not in {u for u, _ in inside}}
         for m in self._promising(model, others, ADDED):
             grown = (*inside, m)
-            if np.isfinite(self.log_prior(grown)):
+            if self._may_be(grown):
                 self.fit(grown, widths)
         for out in inside:
             kept = tuple(m for m in inside if m != out)
@@ -274,7 +282,7 @@ class Search:
             variants = [m for m in self.candidates if m[0] == out[0] and m != out]
             for m in [*self._promising(less, others, SWAPPED), *variants]:
                 swapped = (*kept, m)
-                if np.isfinite(self.log_prior(swapped)):
+                if self._may_be(swapped):
                     self.fit(swapped, widths)
 
     def _promising(self, model: Model, among: set[tuple[str, int]], most: int) -> list[tuple[str, int]]:

@@ -11,7 +11,6 @@ from .sets import OTHER_FORM
 
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 ONE_MORE_FORM = 0.3  # of a bench with any number of described forms, to have one more
-PROPOSED = 2  # forms that a scan proposed: what needs more of them is a remainder
 REMAINDER_PRIOR = 0.05  # of each equation to have one
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 
@@ -47,7 +46,7 @@ class SetPrior:
         forms, left = kinds.count("form") - controls, kinds.count("remainder")
         n_listed, n_forms, n_left = self.counts
         own = [u for u, v in members if v >= OTHER_FORM]
-        if listed >= len(self.sizes) or sum(self.units[u].proposed for u, _ in members) > PROPOSED:
+        if listed >= len(self.sizes):
             return -np.inf
         value = np.log(self.sizes[listed]) - _log_choose(n_listed, listed)
         value += np.log(1.0 - ONE_MORE_FORM) + forms * np.log(ONE_MORE_FORM / n_forms) + gammaln(forms + 1)

@@ -1,0 +1,93 @@
+"""Recordings whose equations are looked through for what no catalogue lists."""
+
+from collections.abc import Collection, Sequence
+
+from .described import Described, proposed, refined, with_forms
+from .model import LISTED
+from .search import NEAR, Search
+from .sets import Model
+from .settling import Settling
+
+SCANNED = 30_000  # samples that are looked through for forms, or more where few recordings hold them
+SPREAD = 3  # recordings that they are of at least
+FEWEST, MOST = 2, 5  # forms proposed by scans that a set may have: at first, and where they leave no remainder
+
+
+class Describing(Settling):
+    """Recordings of one machine, with the forms that scans of them have proposed."""
+
+    describing = True  # whether recordings are long enough to tell forms and the colour of the noise from each other
+
+    def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
+        super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
+        self.scanned = FEWEST  # forms proposed by scans that a set may have
+
+    def describe(self, forms: Sequence[Described]) -> None:
+        """Take described forms among the candidate causes."""
+        if tuple(forms) == self.described:
+            return
+        self.machine = with_forms(self.machine, forms)
+        self.parameters = dict(self.machine.parameters)
+        self.units = list(self.machine.units)
+        self.point = {n: p.off for n, p in self.parameters.items()} | self.point
+        if self.workers is not None:
+            self.workers.tell("describe", tuple(forms))
+
+    def _describe(self, mark: str) -> bool:
+        """Look through what the present point leaves for forms; whether there are any."""
+        if not self.describing:
+            return False
+        names, workers = self._looked_through(), self._workers()
+        carried = {n: self.carried[n] for n in names}
+        # what stands out is what no listed effect could be, whether or not it acts yet
+        values, free = self.values(), self._free({u.id for u in self.units if u.kind in LISTED} | self.on)
+        parts = [(values, names, carried, free, mark, k, workers.count) for k in range(workers.count)]
+        found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
+        found = [f for f in found if not any(f.same(g) for g in self.described)]
+        self.describe([*self.described, *found])
+        return bool(found)
+
+    def _free(self, units: Collection[str]) -> dict[str, tuple[float, float]]:
+        """What is free beside a form: nuisances and parameters of some units, by name of a column."""
+        names = [p.name for u in self.units if u.id in units for v in self.active(u) for p in v.parameters]
+        return self._full_prior(names, self.columns()[1])
+
+    def _lacking(self, search: Search) -> bool:
+        """Whether the leading set has a remainder where a form acts that a scan proposed."""
+        leading = search.ranked()[0].units
+        places = {q for f in self.described if f.id in leading for q in (f.equation, f.seen)}
+        return any(u.removeprefix("remainder:") in places for u in leading if u.startswith("remainder:"))
+
+    def _count_scanned(self, search: Search) -> int:
+        """Forms that scans proposed in the leading set."""
+        return len({f.id for f in self.described}.intersection(search.ranked()[0].units))
+
+    def _keep_likely(self, search: Search) -> None:
+        """Let go of described forms that no likely set has."""
+        ranked = search.ranked()
+        likely = {u for m in ranked if m.log_posterior > ranked[0].log_posterior - NEAR for u in m.units}
+        self.describe([f for f in self.described if f.id in likely])
+
+    def _looked_through(self) -> list[str]:
+        """As many recordings as a scan needs."""
+        out: list[str] = []
+        samples = 0
+        for name in [*self.recordings[::2], *self.recordings[1::2]]:
+            if samples > SCANNED and len(out) >= SPREAD:
+                break
+            samples += self.machine.samples(name)
+            out.append(name)
+        return out
+
+    def _refine(self, model: Model) -> bool:
+        """Give described forms of a set, fitted at the present point, the shape that is best there; whether any
+        changes."""
+        mine = [f for f in self.described if f.id in model.units]
+        if not mine:
+            return False
+        values, free = self.values(), self._free(self.on)
+        blocks = [b for n in self._looked_through() for b in self.machine.blocks(values, n, wanted=set(free))]
+        better = {f.id: refined(self.machine, f, blocks, self.carried, self.point, free) for f in mine}
+        before = self.described
+        self.describe([better.get(f.id, f) for f in before])
+        return self.described != before
