@@ -1,5 +1,6 @@
 """What a misfit on recordings set aside is compared with."""
 
+from itertools import islice
 from types import SimpleNamespace
 
 import numpy as np
@@ -77,6 +78,55 @@ def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():
     assert _less(search, model, "voltage_gain", False).units == ("cogging",)
 
 
+def searching(units):
+    """A search whose sets are the likelier the more they hold."""
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
+
+    return SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in units])
+
+
+def lacking(sets, ratios):
+    """Effects that are to be held to account first for which the sets lack something."""
+    return {u for told, incomplete in islice(sets.told(ratios, {}), 1) for u in told if incomplete}
+
+
+@pytest.mark.parametrize(
+    ("effect", "equation", "remainder", "incomplete"),
+    [
+        ("control_delay", "control", "control", True),
+        ("inertia", "torque", "control", False),
+        ("inertia", "torque", "torque", True),
+        ("inertia", "torque", "electrical_a", True),
+    ],
+)
+def test_beside_a_remainder_no_set_is_the_true_one(effect, equation, remainder, incomplete):
+    """One of the controller's own business says nothing of the machine, but of what the controller does."""
+    units = {
+        effect: Unit(effect, "structural", (equation,), []),
+        f"remainder:{remainder}": Unit(f"remainder:{remainder}", "remainder", (remainder,), []),
+    }
+    search = searching(units)
+    sets = held_out._Sets(None, SimpleNamespace(models=[search.fit([(u, 0) for u in units])], search=search))
+    assert lacking(sets, {}) == ({effect} if incomplete else set())
+
+
+@pytest.mark.parametrize(("ratio", "incomplete"), [(-4.1, {"control_delay"}), (36.5, {"control_delay"}), (None, set())])
+def test_where_a_remainder_was_seen_no_set_is_the_true_one(ratio, incomplete):
+    """Whether or not it is confirmed: what no model describes then need not be what the exploring recordings showed."""
+    units = {"control_delay": Unit("control_delay", "structural", ("control",), [])}
+    if ratio is not None:
+        units["remainder:control"] = Unit("remainder:control", "remainder", ("control",), [])
+    search = searching(units)
+    sets = held_out._Sets(None, SimpleNamespace(models=[search.fit([(u, 0) for u in units])], search=search))
+    account = SimpleNamespace(of_remainder=lambda _: ratio, let_go=lambda *_: None)
+    ratios = {}
+    held_out._ask_remainders(sets, account, ratios)
+    assert any("remainder:control" in m.units for m in sets.models) == (ratio == 36.5)
+    assert lacking(sets, ratios) == incomplete
+
+
 def test_beside_a_form_that_is_not_confirmed_no_set_of_that_equation_is_the_true_one(monkeypatch):
     monkeypatch.setattr(held_out, "overdispersion", lambda *_: 1.0)
     units = {
@@ -84,17 +134,14 @@ def test_beside_a_form_that_is_not_confirmed_no_set_of_that_equation_is_the_true
         "inertia": Unit("inertia", "structural", ("torque",), []),
         "voltage_gain": Unit("voltage_gain", "structural", ("electrical",), []),
     }
-
-    def fit(members):
-        return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
-
-    search = SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in units])
+    search = searching(units)
+    fit = search.fit
     for ratio, unexplained in ((-4.1, {"inertia"}), (36.5, set())):
         both = fit((("inertia", 0), ("~function", 0)))
         sets = held_out._Sets(None, SimpleNamespace(models=[both], search=search))
         account = SimpleNamespace(ratio=lambda _, ratio=ratio: ratio, instead=lambda _: 0.0, let_go=lambda *_: None)
         held_out._ask_forms(sets, account, {})
-        assert {u for u in ("inertia", "voltage_gain") if sets._is_unexplained(u)} == unexplained
+        assert lacking(sets, {"~function": ratio}) == {"inertia"} & unexplained
         assert any("~function" in m.units for m in sets.models) == (ratio > 0.0)
 
 

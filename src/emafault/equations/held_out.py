@@ -58,10 +58,11 @@ def held_to_account(
     account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
     whole predicts worse than without its effects, each is tried by itself.
 
-    Where there is a remainder, or what is left wanders (``wandering``: by equation, log odds that it does), or in an
-    effect's equation a form was seen that the confirm recordings do not confirm, none of the sets is the true one, and
-    what the explored recordings give a set is no odds of its truth (the M-open view: Bernardo and Smith 1994, Bayesian
-    Theory, 6.1.2): there the predictive densities of the confirm recordings decide by themselves, beside the prior.
+    Where there is a remainder (one of the controller's equations: for what acts there), or what is left wanders
+    (``wandering``: by equation, log odds that it does), or in an effect's equation a form or a remainder was seen that
+    the confirm recordings do not confirm, none of the sets is the true one, and what the explored recordings give a set
+    is no odds of its truth (the M-open view: Bernardo and Smith 1994, Bayesian Theory, 6.1.2): there the predictive
+    densities of the confirm recordings decide by themselves, beside the prior.
 
     What has another size in each recording is held to account likewise: see ``constancy``.
 
@@ -84,11 +85,7 @@ def held_to_account(
     ratios: dict[str, float] = {}
     changes: dict[str, float] = {}
     account.let_go_absent(sets.models)
-    for remainder in sets.untold(ratios, "remainder"):
-        ratios[remainder] = account.of_remainder(remainder)
-        if ratios[remainder] < CLEAR:
-            sets.drop(remainder, False)
-            account.let_go(remainder)
+    _ask_remainders(sets, account, ratios)
     # what is told of effects depends on whether what is described beside them is there, or a remainder in its place
     _ask_forms(sets, account, ratios)
     for told, incomplete in sets.told(ratios, wandering):
@@ -112,6 +109,16 @@ def held_to_account(
     return models, HeldOut(explored, ratios, changes)
 
 
+def _ask_remainders(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:
+    """Hold the remainders to account that the sets would tell."""
+    for remainder in sets.untold(ratios, "remainder"):
+        ratios[remainder] = account.of_remainder(remainder)
+        if ratios[remainder] < CLEAR:
+            sets.unexplained.add(remainder.removeprefix("remainder:"))
+            sets.drop(remainder, False)
+            account.let_go(remainder)
+
+
 def _ask_forms(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:
     """Hold the described forms to account that the sets would tell."""
     for form in sets.untold(ratios, "form"):
@@ -131,24 +138,23 @@ class _Sets:
 
     def __init__(self, bench: Bench, fit: Fit):
         self.bench, self.fit, self.models = bench, fit, list(fit.models)
-        self.unexplained: set[str] = set()  # equations of forms that were seen but not confirmed
+        self.unexplained: set[str] = set()  # equations of forms and remainders that were seen but not confirmed
 
     def told(
         self, ratios: Mapping[str, float], wandering: Mapping[str, float]
     ) -> Iterator[tuple[tuple[str, ...], bool]]:
         """Listed effects that the sets, as they are by then, would name, and groups, not yet held to account; and
-        whether the sets lack something: there is a remainder beside them that is not the controller's own business, or
-        in their equations a form was seen that is not confirmed."""
+        whether the sets lack something: there is a remainder beside them, of the controller's own business only where
+        they act, or in their equations a form or a remainder was seen that is not confirmed."""
         while True:
             found = read(self.models, self.fit.search.units.values(), wandering=wandering)
             left = [t for t in (*((e,) for e in found.named), *found.groups) if not set(t) <= set(ratios)]
             if not left:
                 return
             incomplete = not set(found.remainders) <= set(OWN_BUSINESS)
-            yield left[0], incomplete or any(self._is_unexplained(e) for e in left[0])
-
-    def _is_unexplained(self, unit: str) -> bool:
-        return meet(self.fit.search.units[unit].equations, self.unexplained)
+            beside = self.unexplained | {r.removeprefix("remainder:") for r in found.remainders}
+            units = self.fit.search.units
+            yield left[0], incomplete or any(meet(units[e].equations, beside) for e in left[0])
 
     def untold(self, ratios: Mapping[str, float], kind: str) -> Iterator[str]:
         """Forms or remainders that the sets, as they are by then, would tell, not yet held to account."""
