@@ -1,5 +1,6 @@
 """Diagnoses of benches whose channels come in coarse steps, are noisier than the reference's, filtered, computed of
-duty cycles or another in each recording, or whose controller does more with its command.
+duty cycles or another in each recording, whose controller does more with its command, or on which several things turn
+or pull that no catalogue lists.
 
     python benchmarks/channels.py [--only "encoder of 4096 counts" ...]
 
@@ -11,6 +12,7 @@ currents and speed.
 
 import argparse
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,7 +46,15 @@ def noisier(factor: float, *channels: str) -> tuple[str, ...]:
 
 def entry(place: str, form: str, **numbers: float) -> tuple[str, ...]:
     """Overrides by which a form acts at a place."""
-    return (f"unlisted=[{{place: {place}, form: {form}, {', '.join(f'{n}: {x:g}' for n, x in numbers.items())}}}]",)
+    return entries((place, form, numbers))
+
+
+def entries(*several: tuple[str, str, dict[str, float]]) -> tuple[str, ...]:
+    """Overrides by which several forms act, each at a place with its numbers."""
+    each = [
+        f"place: {p}, form: {f}, {', '.join(f'{n}: {x:g}' for n, x in numbers.items())}" for p, f, numbers in several
+    ]
+    return (f"unlisted=[{', '.join(f'{{{e}}}' for e in each)}]",)
 
 
 @dataclass(frozen=True)
@@ -248,6 +258,18 @@ CHANNELS = {
     ),
     "speed's noise averaged over five samples": Channel(noisier(0.02, "speed"), change=with_averaged_noise),
     "angle new in one sample of five": changed(rotor_angle=lambda x, n: held(x, 5)),
+    "three waves of a bearing": Channel(
+        entries(*(
+            ("torque", "order", {"order": 3.57 * k, "amplitude": 0.005 - 0.001 * k, "phase": k}) for k in (1, 2, 3)
+        )),
+        ("order in torque",) * 3,
+    ),
+    "load for 0.15 s": Channel(
+        entry("torque", "pulse", jump=0.03, time=0.2, until=0.35), ("step_change in torque",)
+    ),
+    "terminal loose for 0.1 s": Channel(
+        entry("resistance_b", "pulse", jump=0.2, time=0.2, until=0.3), ("step_change in electrical_b",)
+    ),
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
     ),
@@ -293,8 +315,9 @@ def main() -> None:
                 verdict = diagnose_bench(read_bench(folder, ActuatorParameters(**SPEC["actuator"])), SPEC).verdict
                 named = verdict["which"][0]["effects"]
                 told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"]]
-                lacking = [t for t in this.itself if t not in told]
-                told = [t for t in told if t not in this.itself]
+                lacking, told = (
+                    list((Counter(a) - Counter(b)).elements()) for a, b in ((this.itself, told), (told, this.itself))
+                )
                 wanted = {*([] if effect == "none" else [effect]), *this.listed}
                 count, right = count + 1, right + (set(named) == wanted)
                 clean += not told and not lacking
