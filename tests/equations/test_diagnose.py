@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emafault.effects import EFFECTS
 from emafault.equations.corrected import corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
@@ -127,11 +128,13 @@ def test_what_a_controller_does_with_its_command_is_told_and_no_gap_of_the_machi
 
 
 def beside_cogging(entries):
-    """Four recordings of a unit with cogging and something unlisted, diagnosed."""
-    return verdict_of({
+    """Two recordings of a unit with cogging and something unlisted, diagnosed with few other effects to choose."""
+    recordings = {
         f"r{n}.nc": recorded(c, COGGING, (0.0,) * 5 + (dT,), seed=n, theta_0=theta_0, unlisted=entries)
-        for n, (c, dT, theta_0) in enumerate(PLANS)
-    })  # fmt: skip
+        for n, (c, dT, theta_0) in enumerate(PLANS[:2])
+    }
+    others = set(EFFECTS) - {"cogging", "inertia", "friction_level", "viscous_friction", "stribeck", "load_constant"}
+    return diagnose("bench", recordings, (list(recordings), ()), ACTUATOR, NOISE, sorted(others)).verdict
 
 
 def test_all_waves_of_a_bearing_are_described():
