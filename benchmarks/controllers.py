@@ -18,6 +18,7 @@ from pathlib import Path
 
 from channels import EFFECTS, SPEC
 from emafault.actuator.parameters import ActuatorParameters
+from emafault.diagnosis.naming import NAMED
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
 
@@ -121,7 +122,7 @@ def main() -> None:
             for effect in EFFECTS:
                 bench = read_bench(Path(benches) / effect, ActuatorParameters(**SPEC["actuator"]))
                 verdict = diagnose_bench(bench, SPEC).verdict
-                named = {e for e, p in verdict["inclusion"].items() if p >= 0.9}
+                named = {e for e, p in verdict["inclusion"].items() if p >= NAMED}
                 wanted = {*([] if effect == "none" else [effect]), *LAWS[name].listed}
                 told = [f"{d['form']} in {d['equation']}" for d in verdict["discovered"]]
                 count, right, wrong = count + 1, right + (named == wanted), wrong + bool(named - wanted)

@@ -7,13 +7,10 @@ import numpy as np
 from ..left import Found, Left, Shape, of_cells, singly
 from . import step_change
 
-AXIS = "time (s)"  # of its picture
-ALONG = "time"
-EACH = False
-POSITIVE: tuple[str, ...] = ()
-CHANNELS: tuple[str, ...] = ("current", "voltage", "output")  # of the measuring chain that may have it
-COEFFICIENTS = ("jump",)
-CELLS = 32
+# beside its two times it is what a jump is
+AXIS, ALONG, EACH, POSITIVE = step_change.AXIS, step_change.ALONG, step_change.EACH, step_change.POSITIVE
+CHANNELS, COEFFICIENTS, CELLS = step_change.CHANNELS, step_change.COEFFICIENTS, step_change.CELLS
+told, position = step_change.told, step_change.position
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
@@ -48,13 +45,3 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
         until, second, value = step_change.nearer(left, until, over, driver)
     found = (("time", time, first, "s"), ("until", until, second, "s"))
     return [Found(found, value, float(CELLS * (CELLS - 1) // 2 * step_change.FINER**2))]
-
-
-def told(values: np.ndarray) -> dict[str, float]:
-    """The jump itself."""
-    return {"jump": float(values[0])}
-
-
-def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
-    """(row,) time."""
-    return np.asarray(coordinates["time"])

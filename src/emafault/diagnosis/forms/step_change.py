@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ..left import Found, Left, Shape, beside_first, of_cells, singly
+from ..left import Found, Left, Shape, beside_first, likeliest, of_cells, singly
 
 AXIS = "time (s)"  # of its picture
 ALONG = "time"
@@ -50,10 +50,10 @@ def nearer(left: Left, at: float, columns: Callable[[Mapping, np.ndarray], np.nd
             return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, times)])
 
         values = singly(*beside_first(*left.products(of, driver)))
-        at, width = float(times[int(np.argmax(values))]), width / FINER
+        k, deviation = likeliest(values, times)
+        at, width = float(times[k]), width / FINER
         if width < finest:
-            weight = np.exp(values - values.max())
-            return at, float(np.sqrt(weight @ (times - at) ** 2 / weight.sum())) + width, float(values.max())
+            return at, deviation + width, float(values[k])
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
