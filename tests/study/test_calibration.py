@@ -120,7 +120,7 @@ def three(tmp_path_factory):
         machine, folder = of_file(path), tmp_path_factory.mktemp(path.stem)
         population = population_of(machine.actuator, machine.tolerances())
         noise = SensorNoise(**config.compose()["sensors"])
-        for rung, seeds in (("T0", (40001, 40003)), ("T1", (40011,))):
+        for rung, seeds in (("T0", (40001,)), ("T1", (40011,))):
             run_cases(rung, seeds, folder, machine.actuator, noise, population=population)
         out[path.stem] = score(folder)["rows"]
     return out
@@ -131,7 +131,7 @@ def test_what_was_checked_on_the_reference_actuator_holds_on_three(three):
     every = [row for rows in three.values() for row in rows]
     assert all(r["right"] for r in every)
     found = summary(every)
-    assert found["holds"] and found["false_names"] == {"named": 0, "cases": 6}
+    assert found["holds"] and found["false_names"] == {"named": 0, "cases": 3}
 
 
 def test_how_long_it_takes_is_said_before_the_cases(tmp_path, monkeypatch, capsys):
