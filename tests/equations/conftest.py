@@ -11,6 +11,7 @@ from emafault.actuator.parameters import ActuatorParameters, make_runs
 from emafault.actuator.sensors import SensorNoise
 from emafault.actuator.simulate import time_axis
 from emafault.dataset import simulate_and_measure
+from emafault.effects import EFFECTS
 from emafault.equations.machine import ReferenceActuator
 from emafault.equations.signals import Signals
 from emafault.io.recording import Recording
@@ -51,6 +52,11 @@ def recorded(
         time=time_axis(0.8, interval), ambient_temperature=ambient, attributes={"health": health, "command": command},
         **{k: v[0] for k, v in out.items()},
     )  # fmt: skip
+
+
+def all_but(*effects):
+    """Effects that the library is to lack, so that few are left to choose: a diagnosis is quicker then."""
+    return sorted(set(EFFECTS).difference(effects))
 
 
 def in_steps(recording, steps):

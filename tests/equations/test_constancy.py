@@ -8,11 +8,10 @@ from emafault.diagnosis.constancy import PRIOR, log_odds_of_change
 from emafault.diagnosis.fit import Bench, Fit
 from emafault.diagnosis.search import Search
 from emafault.diagnosis.sets import Choice, Model
-from emafault.effects import EFFECTS
 from emafault.equations.diagnose import diagnose
 from emafault.equations.verdict import remainder_sentence
 
-from .conftest import ACTUATOR, NOISE, machine_of, recorded
+from .conftest import ACTUATOR, NOISE, all_but, machine_of, recorded
 
 PLANS = (("parabolic", 30.0), ("reversal", 30.0), ("sine", -20.0), ("parabolic", -20.0))
 
@@ -56,8 +55,8 @@ def test_recordings_that_do_not_show_an_effect_say_nothing_of_it():
 def test_what_changes_is_not_named_but_told():
     recordings = bench_of([60.0, -60.0, 20.0, -40.0])
     names = list(recordings)
-    others = set(EFFECTS) - {"load_spring", "load_constant", "inertia", "friction_level", "viscous_friction", "cogging"}
-    verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, sorted(others)).verdict
+    others = all_but("load_spring", "load_constant", "inertia", "friction_level", "viscous_friction", "cogging")
+    verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, others).verdict
     assert "load_spring" not in verdict["which"][0]["effects"] and verdict["inclusion"]["load_spring"] < 0.9
     assert "torque" in {e["equation"] for e in verdict["discovered"]}
 

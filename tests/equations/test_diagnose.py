@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.effects import EFFECTS
 from emafault.equations.corrected import corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
 from emafault.first_order import smoothed
 from emafault.io.recording import read_recording
 
-from .conftest import ACTUATOR, NOISE, in_steps, recorded
+from .conftest import ACTUATOR, NOISE, all_but, in_steps, recorded
 
 PLANS = (("parabolic", 30.0, 0.3), ("reversal", 30.0, 1.1), ("sine", -20.0, 2.0), ("parabolic", -20.0, 4.0))
 
@@ -133,8 +132,8 @@ def beside_cogging(entries):
         f"r{n}.nc": recorded(c, COGGING, (0.0,) * 5 + (dT,), seed=n, theta_0=theta_0, unlisted=entries)
         for n, (c, dT, theta_0) in enumerate(PLANS[:2])
     }
-    others = set(EFFECTS) - {"cogging", "inertia", "friction_level", "viscous_friction", "stribeck", "load_constant"}
-    return diagnose("bench", recordings, (list(recordings), ()), ACTUATOR, NOISE, sorted(others)).verdict
+    others = all_but("cogging", "inertia", "friction_level", "viscous_friction", "stribeck", "load_constant")
+    return diagnose("bench", recordings, (list(recordings), ()), ACTUATOR, NOISE, others).verdict
 
 
 def test_all_waves_of_a_bearing_are_described():
