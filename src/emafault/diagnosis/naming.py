@@ -20,7 +20,7 @@ from .sets import Model, posterior
 NAMED = 0.9
 PRESENT = 0.5  # of a remainder, from which it is more likely there than not
 #: what the controller does with what it sees is no gap of the machine
-OWN_BUSINESS = ("remainder:control", "remainder:commutation")
+OWN_BUSINESS = ("remainder:control",)
 MEMBERS = 4  # largest group
 MOST = 12  # sets told
 POSSIBLE = 0.1  # inclusion from which a listed effect, or something undescribed, is told as possible

@@ -79,6 +79,12 @@ def by_angle(state: State) -> np.ndarray:
     return np.concatenate(out)
 
 
+def by_angle_of(state: State) -> np.ndarray:
+    """(phase, row) the same with the angle of the edges of one phase."""
+    phase = np.repeat(range(3), [len(rows_of(state, j)) for j in range(3)])
+    return np.where(phase == np.arange(3)[:, None], by_angle(state), 0.0)
+
+
 def _shares(state: State, j: int) -> tuple[np.ndarray, Dual, np.ndarray, np.ndarray]:
     """Intervals of phase j, where the current passes over (electrical rad), (row,) the share of an interval beyond
     that, and how it changes with that."""

@@ -78,6 +78,8 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     if equation == "torque":
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
         kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}
+    if equation == "commutation":
+        kinds["sizes"] = dict.fromkeys(range(1, 4), 0.1 * commutation.REACH)
     if equation == "control":
         phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
     elif equation.startswith("electrical") and of is not None:
@@ -115,6 +117,8 @@ def drivers_of(state: State, equation: str, functions: Mapping[str, Any]) -> lis
     of = rows_of(state, equation)
     if of is not None:
         out = [of(d) for d in out]
+    if equation == "commutation":  # the angle at which each phase is switched on
+        out += list(commutation.by_angle_of(state))
     return [*out, control.late(state)] if equation == "control" else out
 
 
