@@ -207,6 +207,17 @@ def test_what_comes_and_goes_counts_less():
     assert np.mean(filtered(white[:, None], weights) ** 2) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize("changing", [False, True])
+def test_the_noise_of_a_converter_s_steps_is_no_less_for_rows_that_leave_nothing(changing):
+    """Most rows may leave nothing as all of a current is rounded off; the others have all of the error."""
+    rng = np.random.default_rng(7)
+    white = np.where(rng.random(6000) < 0.1, rng.standard_normal(6000), 0.0)
+    keep = np.ones(len(white), bool)
+    assert np.median(coloured(white, keep, changing).variance) < 0.2
+    weights = coloured(white, keep, changing, 1.0)
+    assert weights.variance.min() == pytest.approx(1.0) and not len(weights.coefficients)
+
+
 def test_a_level_that_wanders_does_not_look_like_a_constant():
     rng = np.random.default_rng(5)
     keep = np.ones(8000, bool)

@@ -314,5 +314,6 @@ def weights_from(
         keep = usable
     if keep.sum() < FEW:  # no spectrum: the noise as stated, or more
         return Weights(keep, np.zeros(0), np.full(len(keep), max(float(np.mean(left[keep] ** 2)), 1.0)))
-    found = coloured(np.where(keep, left, 0.0), keep, leads)
+    # most rows may leave nothing where all of a current is rounded off, the others have no less of an error for it
+    found = coloured(np.where(keep, left, 0.0), keep, leads, 1.0 if block.rounded else 0.0)
     return replace(found, wandering=()) if block.rounded else found

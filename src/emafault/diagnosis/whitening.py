@@ -204,16 +204,16 @@ def filtered(rows: np.ndarray, weights: Weights) -> np.ndarray:
     return _filter(rows, weights.usable, weights.wander, weights.coefficients, 1.0 / np.sqrt(weights.variance))
 
 
-def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True) -> Weights:
+def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True, least: float = 0.0) -> Weights:
     """The model of what is left of white rows: an autoregression and its variance; where it may be ``changing``, how
-    its level wanders and how its variance comes and goes as well."""
+    its level wanders and how its variance comes and goes as well. ``least``: of its spectrum, at every frequency."""
     n = max(1, int(keep.sum()))
     best, chosen = np.inf, Weights(keep, np.zeros(0), np.ones(len(white)))
     scores = []
     for wander in WANDERING if changing else (0.0,):
         trial = Weights(keep, np.zeros(0), np.ones(len(white)), wander)
         left = filtered(white[:, None], trial)[:, 0]
-        coefficients, variance = autoregression(left, keep)
+        coefficients, variance = autoregression(left, keep, least)
         trial = replace(trial, coefficients=coefficients)
         # of what it leaves of these rows, not of the spectrum without dips: else a level that is none takes up what an
         # autoregression then lacks
@@ -230,7 +230,7 @@ def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True) -> Weig
     new = filtered(white[:, None], chosen)[:, 0]
     local = local_variance(new, keep, LOCAL)
     variance = chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local
-    return replace(chosen, variance=np.maximum(variance, 1e-6))
+    return replace(chosen, variance=np.maximum(variance, chosen.variance if least > 0.0 else 1e-6))
 
 
 def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarray:
@@ -248,8 +248,8 @@ def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarra
     return np.maximum(local / max(most, 1e-300), 1.0)
 
 
-def _without_dips(r: np.ndarray) -> np.ndarray:
-    """Autocovariances (lag,) of a spectrum that is nowhere below its median.
+def _without_dips(r: np.ndarray, least: float) -> np.ndarray:
+    """Autocovariances (lag,) of a spectrum that is nowhere below its median, or what it is at ``least``.
 
     A model that fits, or a difference that is none, digs a hole into the spectrum of what is left; taken for noise
     that is quieter there, it would make a bias look significant.
@@ -258,11 +258,11 @@ def _without_dips(r: np.ndarray) -> np.ndarray:
     w = (np.arange(GRID) + 0.5) * np.pi / GRID
     cosine = np.cos(np.outer(w, k[1:]))
     spectrum = r[0] + 2.0 * cosine @ (r[1:] * (1.0 - k[1:] / len(r)))
-    spectrum = np.maximum(spectrum, np.median(spectrum))
+    spectrum = np.maximum(spectrum, max(np.median(spectrum), least))
     return np.concatenate([[spectrum.mean()], spectrum @ cosine / GRID])
 
 
-def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float]:
+def autoregression(x: np.ndarray, usable: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, float]:
     """Autoregressive coefficients of a residual (row,) by Yule-Walker, order by BIC, and innovation variance."""
     x = np.where(usable, x, 0.0)
     n = max(1, int(usable.sum()))
@@ -271,7 +271,7 @@ def autoregression(x: np.ndarray, usable: np.ndarray) -> tuple[np.ndarray, float
     r = np.array([float(x[k:] @ x[: len(x) - k]) / n for k in range(lags + 1)])
     if r[0] <= 0.0:
         return np.zeros(0), 1.0
-    r = _without_dips(r)
+    r = _without_dips(r, least)
     best, chosen, variance = n * np.log(r[0]), np.zeros(0), r[0]
     a, error = np.zeros(0), r[0]
     for order in range(1, top + 1):  # Levinson-Durbin

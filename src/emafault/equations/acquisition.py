@@ -181,22 +181,37 @@ def gain(p: Point, j: int) -> Dual:
     return out
 
 
+def rounding_names(stretch: int, recording: str) -> tuple[str, str]:
+    """Errors at the start and at the end of a stretch of a recording."""
+    return f"rounded.{stretch}_start@{recording}", f"rounded.{stretch}_end@{recording}"
+
+
 def _rounding(rec: Signals, p: Point) -> Dual | None:
     """What a converter's coarse steps add to the size of a current that changes slowly (A), (sample,): the same in
-    both directions. What they add to others is noise."""
-    where = rec.rows_from.once(("stretches",), rec.rows_from.stretches)
-    if not where:
+    both directions, and evenly from one value to another while the current goes through a step. What they add to others
+    is noise."""
+    columns = rec.rows_from.once(("rounding",), lambda: _of_stretches(rec.rows_from))
+    if not columns:
         return None
     value = np.zeros(rec.size)
     slopes: dict[str, Number] = {}
-    for k, there in enumerate(where):
-        off = p(f"rounded.{k}@{rec.name}")
-        value[there] = off.value
-        for n in off.slopes:
-            column = np.zeros(rec.size)
-            column[there] = 1.0
-            slopes[n] = column
+    for name, column in columns.items():
+        off = p(name)
+        if off.value:
+            value += off.value * column
+        slopes |= dict.fromkeys(off.slopes, column)
     return Dual(value, slopes)
+
+
+def _of_stretches(rec: Signals) -> dict[str, np.ndarray]:
+    """(sample,) each of what an error at the start or at the end of a stretch is along it."""
+    out: dict[str, np.ndarray] = {}
+    for k, there in enumerate(rec.stretches()):
+        along = np.linspace(0.0, 1.0, there.stop - there.start)
+        for name, share in zip(rounding_names(k, rec.name), (1.0 - along, along), strict=True):
+            out[name] = np.zeros(rec.size)
+            out[name][there] = share
+    return out
 
 
 def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:

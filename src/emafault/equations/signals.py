@@ -23,8 +23,8 @@ UNRESOLVED = 0.2  # of the change from interval to interval: where within one a 
 SLOW = 2.0  # rad/s, below which dry friction has no known sign
 STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands still does not change
 AVERAGED_AT_REST = 2e-2  # s
-STRETCH = 12  # samples, that an error of rounding is the same over, from which it is none of the noise's
-STRETCHES = 60  # in a recording
+STRETCH = 12  # samples, that an error of rounding changes evenly over, from which it is none of the noise's
+STRETCHES = 30  # in a recording
 QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
 #: channels that may be slower than the recording -> variable
 MAY_BE_SLOWER = {"speed": "rotor_speed", "output": "output_position", "bus": "bus_voltage"}
@@ -169,13 +169,13 @@ class Signals:
         return self._once[key]
 
     def stretches(self) -> list[slice]:
-        """The longest stretches in which a current in coarse steps is nowhere a step from where it is elsewhere: over
-        each the error of rounding is much the same."""
+        """The longest stretches in which a current in coarse steps is nowhere more than half a step from where it is
+        elsewhere, as where one of two phases is a step on: over each the error of rounding changes evenly."""
         if self.current_step == 0.0:
             return []
         found, first, low, high = [], 0, np.inf, -np.inf
         for k, x in enumerate([*self.level.tolist(), np.inf]):
-            if max(high, x) - min(low, x) > 1.01 * self.current_step:
+            if max(high, x) - min(low, x) > 0.51 * self.current_step:
                 found.append(slice(first, k))
                 first, low, high = k, x, x
             else:

@@ -112,7 +112,7 @@ def _of_group(group: str, short: str) -> str:
         "ambient": "temperature at the start above the recorded ambient one",
         "skew": f"{short} channel is sampled late by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
-        "rounded": f"rounding of the current, stretch {short}",
+        "rounded": f"rounding of the current, stretch {short.replace('_', ', ')}",
         "lag": f"{channel_in_words(late)} {_late(short.rpartition('_')[2])}",
         **{
             f"crosstalk_{quantity}": f"{quantity} of phase {phase} in the channel of phase {short[0]}"
