@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .evidence import Definite, Normal, Reduced
+from .evidence import Definite, Normal
 from .fit import Bench
 from .linear import White, assemble, compressed, correct, disturbance, white_rows
 from .model import SETTINGS, Block
@@ -129,14 +129,15 @@ def coefficients(whites: Sequence[White]) -> tuple[float, int]:
 
 
 def placebo(
-    explored: Reduced, confirm: Sequence[White], equations: Sequence[str], size: int
+    explored: Normal, confirm: Sequence[White], equations: Sequence[str], size: int
 ) -> tuple[float, list[White]]:
     """Median root mean square on the confirm recordings with random signatures fitted to the explored ones, and the
     blocks of the draw next to it.
 
     Parameters
     ----------
-    explored : log evidence at the recalibrated nominal model, the nuisances marginalised
+    explored : normal equations at the recalibrated nominal model, which stays as it is: of what its own parameters
+        could make up for the explored recordings say nothing, and the others all the more
     confirm : blocks there, with their columns of remainders
     equations : in which the signatures act; they are random functions of the remainder's coordinates
     size : number of signatures, as many as the named set has parameters
@@ -148,7 +149,7 @@ def placebo(
         return rms(confirm), list(confirm)
     held = assemble(confirm, names, {})
     k = np.array([explored.index[n] for n in names])
-    M, b = explored.M[np.ix_(k, k)], explored.b[k]
+    M, b = explored.H[np.ix_(k, k)], -explored.g[k]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(M), 1e-12))
     rng = np.random.default_rng(20)
     found = []

@@ -67,7 +67,7 @@ def shrinks(
     equations = sorted({q for u in model.units if u in units for e in units[u].equations for q in _blocks_of(e)})
     count = rows(base)
     left = Model(tuple(Choice(f"remainder:{e}", 0, 1.0) for e in equations))
-    at_null = nominal_unit.reduce(nominal_unit.normal(nominal_unit.linearise(left), left))
+    at_null = nominal_unit.normal(nominal_unit.linearise(left), left)
     median, middle = placebo(at_null, base, equations, len(mine))
     signal: dict[str, float | None] = {
         "nominal": rms(at_nominal), "recalibrated": rms(base),

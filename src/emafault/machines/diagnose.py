@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ..diagnosis.evidence import Reduced
+from ..diagnosis.evidence import Normal
 from ..diagnosis.fit import NOTHING, Fit
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
@@ -78,9 +78,9 @@ class Fitted:
         return self.null.values()
 
     @property
-    def at_base(self) -> Reduced:
-        """Evidence there, the base model's parameters marginalised."""
-        return self.null.reduce(self.null.normal(self.null.linearise()))
+    def at_base(self) -> Normal:
+        """Normal equations there."""
+        return self.null.normal(self.null.linearise())
 
     def from_off(self, model: Model) -> dict[str, float]:
         """A set's own parameters and remainders as deviations from off, by column."""

@@ -118,7 +118,7 @@ def same_trace(plain: Diagnosed, effect: str) -> set[str]:
     data tell apart (one channel's gain is the other two's and the mean's).
     """
     null = plain.whole.null
-    reduced = plain.whole.at_base
+    reduced = plain.whole.null.reduce(plain.whole.at_base)
     columns = {
         u.id: [reduced.index[p.name] for v in null.active(u) for p in v.parameters if p.name in reduced.index]
         for u in null.units
