@@ -13,6 +13,7 @@ from emafault.diagnosis.forms import FORMS
 from emafault.diagnosis.whitening import Weights
 from emafault.equations.carried import DRIVERS, of_chain, of_form
 from emafault.equations.handover import experiment_text
+from emafault.equations.telling import differing_gains
 from emafault.io.recording import Recording
 from emafault.schema import check_unlisted
 
@@ -219,6 +220,15 @@ def test_an_experiment_says_what_it_does_not_simulate():
     text = experiment_text(verdict, {"cogging": {"a": 0.01}}, "mine")
     assert "# not simulated: The bus equation leaves more.\n" in text and "A wave." not in text
     assert "place: torque" in text and "position_gain: 80.0" in text and "speed_gain" not in text
+
+
+@pytest.mark.parametrize(("unit", "told"), [("remainder:control", False), ("remainder:commutation", True)])
+def test_a_gain_is_told_beside_what_the_commutations_leave_but_not_beside_what_the_control_law_does(unit, told):
+    """What the control law leaves may be a gain's doing; the commutations depend on no gain."""
+    gain = {"value": 0.2, "low": 0.19, "high": 0.21, "nominal": 0.25}
+    left = {"unit": unit, "equation": "control", "form": "remainder"}
+    found = differing_gains({"controller": {"speed_gain": gain}, "discovered": [left]})
+    assert ("speed_gain" in found) is told
 
 
 def test_a_wave_lies_alike_in_both_directions():

@@ -96,6 +96,8 @@ def test_displaced_sensors_that_the_library_lacks_are_no_unit_s_tolerance_but_un
     first = max(verdict["which"], key=lambda w: w["probability"])
     assert (first["effects"], first["equation"]) == (["unknown"], "control") and first["probability"] > 0.9
     assert verdict["shrinks"]["signal"]["closed"] > 0.7
+    (told,) = (d["sentence"] for d in verdict["discovered"])
+    assert told == "The control equation leaves more than noise at the commutations, not described further."
 
 
 def test_the_seal_can_be_recomputed(cogging):

@@ -181,16 +181,11 @@ def gain(p: Point, j: int) -> Dual:
     return out
 
 
-def rounding_names(stretch: int, recording: str) -> tuple[str, str]:
-    """Errors at the start and at the end of a stretch of a recording."""
-    return f"rounded.{stretch}_start@{recording}", f"rounded.{stretch}_end@{recording}"
-
-
 def _rounding(rec: Signals, p: Point) -> Dual | None:
     """What a converter's coarse steps add to the size of a current that changes slowly (A), (sample,): the same in
     both directions, and evenly from one value to another while the current goes through a step. What they add to others
     is noise."""
-    columns = rec.rows_from.once(("rounding",), lambda: _of_stretches(rec.rows_from))
+    columns = errors_of_rounding(rec.rows_from)
     if not columns:
         return None
     value = np.zeros(rec.size)
@@ -203,14 +198,18 @@ def _rounding(rec: Signals, p: Point) -> Dual | None:
     return Dual(value, slopes)
 
 
-def _of_stretches(rec: Signals) -> dict[str, np.ndarray]:
-    """(sample,) each of what an error at the start or at the end of a stretch is along it."""
+def errors_of_rounding(rec: Signals) -> dict[str, np.ndarray]:
+    """Errors at the start and at the end of each stretch, and what each of them is along it; (sample,) by name."""
+    return rec.once(("rounding",), lambda: _new_errors(rec))
+
+
+def _new_errors(rec: Signals) -> dict[str, np.ndarray]:
     out: dict[str, np.ndarray] = {}
     for k, there in enumerate(rec.stretches()):
         along = np.linspace(0.0, 1.0, there.stop - there.start)
-        for name, share in zip(rounding_names(k, rec.name), (1.0 - along, along), strict=True):
-            out[name] = np.zeros(rec.size)
-            out[name][there] = share
+        for end, share in (("start", 1.0 - along), ("end", along)):
+            column = out[f"rounded.{k}_{end}@{rec.name}"] = np.zeros(rec.size)
+            column[there] = share
     return out
 
 

@@ -79,8 +79,8 @@ def by_angle(state: State) -> np.ndarray:
     return np.concatenate(out)
 
 
-def by_angle_of(state: State) -> np.ndarray:
-    """(phase, row) the same with the angle of the edges of one phase."""
+def by_angle_of_phase(state: State) -> np.ndarray:
+    """(phase, row) how it changes with the angle at which one phase's edges lie (A/rad)."""
     phase = np.repeat(range(3), [len(rows_of(state, j)) for j in range(3)])
     return np.where(phase == np.arange(3)[:, None], by_angle(state), 0.0)
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..actuator.parameters import ActuatorParameters
+from ..diagnosis.sets import REMAINDER_SIZES
 from . import commutation, control, electrical, torque
 from .point import State
 from .signals import SPEED_SPAN, Signals, odd
@@ -79,7 +80,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
         kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}
     if equation == "commutation":
-        kinds["sizes"] = dict.fromkeys(range(1, 4), 0.1 * commutation.REACH)
+        kinds["sizes"] = dict.fromkeys(range(1, 4), commutation.REACH / max(REMAINDER_SIZES))
     if equation == "control":
         phi = [f for k, f in enumerate(phi) if k != LEVEL]  # the measured quantity itself
     elif equation.startswith("electrical") and of is not None:
@@ -118,7 +119,7 @@ def drivers_of(state: State, equation: str, functions: Mapping[str, Any]) -> lis
     if of is not None:
         out = [of(d) for d in out]
     if equation == "commutation":  # the angle at which each phase is switched on
-        out += list(commutation.by_angle_of(state))
+        out += list(commutation.by_angle_of_phase(state))
     return [*out, control.late(state)] if equation == "control" else out
 
 

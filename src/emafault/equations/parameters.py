@@ -88,9 +88,8 @@ def nuisances(
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
         for full, k, _ in position.rounding_names(name) if rec.output_step > 0.0 else ():
             out[full] = Parameter(full, 0.0, 0.0, rec.output_step / (np.sqrt(2.0) * np.pi * k), "rad")
-        for k in range(len(rec.stretches())):
-            for full in acquisition.rounding_names(k, name):
-                out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
+        for full in acquisition.errors_of_rounding(rec):
+            out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
         for full in (n for j in range(3) for n in commutation.passing(j, name)):
             out[full] = Parameter(full, 0.0, 0.0, commutation.ripple_time(a), "s")
         if rec.health == "seeded":

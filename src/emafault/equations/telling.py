@@ -100,7 +100,7 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
 
 def differing_gains(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Gains of the controller, as a verdict has them, that are told as different from the nominal ones."""
-    left = any(d["form"] == "remainder" and d["equation"] == "control" for d in verdict["discovered"])
+    left = any(d.get("unit") == "remainder:control" for d in verdict["discovered"])
     out = {}
     for name, g in verdict["controller"].items():
         if left and name != "position_gain":

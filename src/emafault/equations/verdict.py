@@ -223,7 +223,8 @@ def remainder_sentence(search: Search, equation: str, changes: Mapping[str, floa
         for e, odds in changes.items()
         if odds > 0.0 and equation.startswith(tuple(search.units[e].equations))
     ]
-    said = f"The {equation.replace('_', ' ')} equation leaves more than noise, not described further."
+    where = f"The {EQUATION.get(equation, equation).replace('_', ' ')} equation leaves more than noise"
+    said = f"{where}{' at the commutations' if equation == 'commutation' else ''}, not described further."
     if like:
         said += f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
     return said
