@@ -72,6 +72,7 @@ def test_an_effect_is_named_with_its_size(cogging):
 
 COARSE = {
     "currents": ({"phase_current": 0.05, "phase_current_end": 0.05}, {}, "sensor_current"),
+    "currents beside an effect": ({"phase_current": 0.09, "phase_current_end": 0.09}, COGGING, "sensor_current"),
     "output beside an effect": ({"output_position": 1e-4}, COGGING, "position"),
     "encoder of 4096 counts beside an effect": ({"rotor_angle": 2.0 * np.pi / 4096.0}, COGGING, None),
 }
@@ -80,7 +81,8 @@ COARSE = {
 @pytest.mark.parametrize("case", COARSE)
 def test_coarse_steps_are_told_and_nothing_for_them(case):
     steps, effects, equation = COARSE[case]
-    exclude = all_but("cogging", "stribeck", "magnet_temperature", "self_heating", "backlash") if not effects else ()
+    few = all_but("cogging", "stribeck", "magnet_temperature", "self_heating", "backlash")
+    exclude = few if equation == "sensor_current" else ()
     verdict = verdict_of({name: in_steps(r, steps) for name, r in bench(effects).items()}, exclude=exclude)
     assert [(d["form"], d["equation"]) for d in verdict["discovered"]] == ([("adc_step", equation)] if equation else [])
     assert verdict["which"][0]["effects"] == list(effects)
