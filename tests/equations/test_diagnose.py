@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from emafault.equations.corrected import corrected, write_corrected
 from emafault.equations.diagnose import diagnose
+from emafault.equations.handover import experiment_text
 from emafault.errors import InputError
 from emafault.first_order import smoothed
 from emafault.io.recording import read_recording
@@ -100,6 +102,24 @@ def test_displaced_sensors_that_the_library_lacks_are_no_unit_s_tolerance_but_un
     assert verdict["shrinks"]["signal"]["closed"] > 0.7
     (told,) = (d["sentence"] for d in verdict["discovered"])
     assert told == "The control equation leaves more than noise at the commutations, not described further."
+
+
+def test_what_a_unit_is_beyond_its_tolerance_and_the_library_does_not_list_is_told_and_simulated():
+    """Its inertia is in the equations all the same: within its tolerance alone it had been called no gap."""
+    recordings = bench({"inertia": {"scale": 1.25}})
+    names = list(recordings)
+    exclude = all_but("cogging", "friction_level", "load_constant")
+    found = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, exclude)
+    verdict = found.verdict
+    assert verdict["verdict"] == "described" and verdict["which"][0]["effects"] == []
+    (told,) = verdict["discovered"]
+    assert (told["equation"], told["form"], told["term"]) == ("torque", "coefficient", None)
+    assert told["parameters"]["scale"]["low"] < 1.25 < told["parameters"]["scale"]["high"]
+    assert "inertia, relative to nominal: 1.25 where 1 +- 0.03 is expected" in told["sentence"]
+    assert told["closed"] == verdict["shrinks"]["signal"]["closed"] > 0.9
+    text = experiment_text(verdict, verdict["simulator"]["after"], "again")
+    assert "not simulated" not in text
+    assert yaml.safe_load(text)["effects"]["inertia"]["scale"] == pytest.approx(1.25, abs=0.02)
 
 
 def test_the_seal_can_be_recomputed(cogging):

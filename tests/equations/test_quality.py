@@ -50,3 +50,11 @@ def test_a_limit_that_a_coarse_converter_shows_again_and_again_is_no_clipping():
     current[400:406, 0] = current.max() + 2.0
     current[[390, 392, 394], 0] = current.max() - np.array([0.05, 0.1, 0.15])  # on the way there
     assert [t["form"] for t in told({"a.nc": seen(replace(coarse, phase_current=current))})] == ["adc_step"]
+
+
+def test_steps_of_the_speed_are_told_where_the_library_has_no_effect_for_them():
+    coarse = in_steps(recorded(), {"rotor_speed": 0.5})
+    assert told({"a.nc": seen(coarse)}) == []
+    (entry,) = told({"a.nc": seen(coarse, ("cogging", "speed_quantisation"))})
+    assert (entry["equation"], entry["form"]) == ("sensor_speed", "adc_step")
+    assert entry["parameters"]["step"]["value"] == pytest.approx(0.5)

@@ -14,6 +14,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
 from .acquisition import GAIN_NAMES
+from .parameters import BEYOND
 from .telling import subject
 
 Entry = dict[str, Any]
@@ -142,8 +143,9 @@ def entries(verdict: Mapping[str, Any]) -> list[Entry]:
 
 
 def left_out(verdict: Mapping[str, Any]) -> list[str]:
-    """Sentences of what a verdict describes and the simulators do not carry."""
-    return [str(d["sentence"]) for d in verdict["discovered"] if not d.get("term")]
+    """Sentences of what a verdict describes and the simulators do not carry; the unit's own values they have."""
+    missing = [d for d in verdict["discovered"] if not d.get("term")]
+    return [str(d["sentence"]) for d in missing if not d.get("unit", "").startswith(BEYOND)]
 
 
 def _rounded(value: Any) -> Any:

@@ -358,7 +358,12 @@ def _taken_out(explored: Explored, model: Model, inserted: Inserted, unit: str) 
     names = {
         n for c in model.choices if c.unit == unit for n in explored.fit.search.candidates[c.unit, c.variant].names
     }
-    off = {n: p.off for n, p in explored.bench.parameters.items() if n in names}
+    off: dict[str, float] = {}
+    for n, p in explored.bench.parameters.items():
+        if n in names:
+            off[n] = p.off
+            if p.alias:  # its quantity has what is beyond the tolerance in it
+                off[p.alias] = off.get(p.alias, inserted.values[p.alias]) - inserted.values[n]
     left = tuple(c for c in model.choices if c.unit != unit)
     deviations = {n: d for n, d in model.deviations.items() if n not in names}
     beside = {n: x for n, x in inserted.beside.items() if n not in names}

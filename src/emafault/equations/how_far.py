@@ -78,7 +78,10 @@ def shrinks(
     for entry in found:
         form = units.get(entry["unit"])
         if form is not None and form.id in model.units:
-            own = {p.name: after[p.name] for p in form.parameters}
+            if set(model.units) == {form.id}:  # by itself it is all that was inserted
+                entry["closed"] = signal["closed"]
+                continue
+            own = {n: after[n] for p in form.parameters for n in (p.name, p.alias) if n}
             alone = ladder.blocks(recalibrated | own, also=list(own), settings=CONTROLLER_SETTINGS)
             entry["closed"] = closed(rms(base), rms(alone), 1.0, count)
     return {

@@ -12,7 +12,7 @@ from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
 from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
-from .parameters import controller, internal, measuring_chain, nuisances, unit_of
+from .parameters import beyond_tolerance, controller, internal, measuring_chain, nuisances, unit_of
 from .point import Point, State
 from .signals import Signals
 
@@ -71,6 +71,8 @@ class ReferenceActuator:
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
         self.units += [*measuring_chain(actuator, self.recordings, self.reference), *controller(actuator)]
+        lacking = [e for e in self.catalogue.values() if e.id in exclude]
+        self.units += beyond_tolerance(lacking, actuator, self.parameters)
         for unit in self.units:
             for p in unit.parameters:
                 self.parameters.setdefault(p.name, p)

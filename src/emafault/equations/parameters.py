@@ -1,6 +1,6 @@
 """What the equations are fitted in: nuisances, effects and faults of the measuring chain, with their priors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,7 @@ SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
 PER_PHASE = ("a", "b", "c")
+BEYOND = "~tolerance_"  # of the name of a form, before the effect whose quantities lie beyond their tolerance
 #: equations that a channel's faults show in, beside the one that is named after it
 IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",), "bus_voltage": ("bus",)}
 GAINED = ("current", "voltage", "output")  # quantities whose gain may be off
@@ -135,6 +136,16 @@ def unit_of(effect: Effect, actuator: ActuatorParameters, known: Mapping[str, Pa
         parameter = Parameter(full, 0.0, mean, sd, "1", secant={f"{effect.id}.{k}": v for k, v in shape.items()})
         variants.append(Variant([parameter], [0 if near else 1]))
     return Unit(effect.id, effect.kind, effect.equations, variants, Variant(parameters, positive, least))
+
+
+def beyond_tolerance(
+    effects: Sequence[Effect], actuator: ActuatorParameters, known: Mapping[str, Parameter]
+) -> list[Unit]:
+    """Forms of what is calibrated of a unit and the library at hand does not list: it is in the equations all the same,
+    within its tolerance, and no fit may take it beyond without a word."""
+    of = [e for e in effects if e.kind == "calibration"]
+    units = [unit_of(e, actuator, known) for e in of]
+    return [replace(u, id=BEYOND + u.id, kind="form", among=float(len(of))) for u in units]
 
 
 def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str) -> list[Unit]:

@@ -1,6 +1,6 @@
 """What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -23,7 +23,8 @@ CHANNELS = {
     "rotor_speed": ("sensor_speed", "speed", "rad/s", "speed"),
     "rotor_angle": ("sensor_angle", "angle", "rad", "angle"),
 }
-BY_STEPS = ("rotor_speed", "rotor_angle")  # whose steps are an effect of the catalogue, or an encoder's counts
+#: channels whose steps are an effect of the catalogue, or an encoder's counts
+BY_STEPS = {"rotor_speed": "speed_quantisation", "rotor_angle": None}
 ROWS = 12  # recordings in the picture of their quality
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
@@ -49,8 +50,9 @@ class Channel:
     every: float = 0.0
 
 
-def seen(recording: Recording) -> dict[str, Channel]:
-    """What the channels of a recording show, those that it has of ``CHANNELS``."""
+def seen(recording: Recording, lacking: Collection[str] = ()) -> dict[str, Channel]:
+    """What the channels of a recording show, those that it has of ``CHANNELS``; ``lacking``: effects of the catalogue
+    that the library at hand has not."""
     out = {}
     cut = cut_off(recording)
     for channel in CHANNELS:
@@ -67,7 +69,7 @@ def seen(recording: Recording) -> dict[str, Channel]:
             out[channel] = replace(out[channel], spikes=found / len(values) if found >= FEWEST_SPIKES else 0.0)
         if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := resting_noise([recording])):
             out[channel] = replace(out[channel], noise=noise)
-        if channel in BY_STEPS:
+        if channel in BY_STEPS and BY_STEPS[channel] not in lacking:
             out[channel] = replace(out[channel], step=0.0, held=0.0)
     return out
 

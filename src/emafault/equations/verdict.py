@@ -22,11 +22,12 @@ from . import carried, telling
 from .held_out import HeldOut
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
-from .parameters import GAINS
+from .parameters import BEYOND, GAINS
 from .point import SEEDED
 from .quality import at_a_glance, told
 from .telling import EQUATION, Z
 from .telling_chain import told_of_chain
+from .telling_tolerance import told_of_tolerance
 from .terms import TERMS
 
 SCHEMA = "2.0"
@@ -187,10 +188,15 @@ def _discovered(fitted: Fitted) -> list[dict]:
         if form in described:
             values = bench.point | {n: v for n, (v, _) in linear.items()}
             blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
-            found = curve(bench.machine, described[form], blocks, bench.carried, values)
+            seen = curve(bench.machine, described[form], blocks, bench.carried, values)
             entry = telling.told(described[form], linear, machine.actuator)
-            entry["curve"] = telling.picture(described[form], found, machine.actuator)
+            entry["curve"] = telling.picture(described[form], seen, machine.actuator)
             entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
+        elif form.startswith(BEYOND):
+            effect = form.removeprefix(BEYOND)
+            found = _parameters(bench, machine, (effect,), model)
+            entry = told_of_tolerance(effect, unit.equations[0], found, bench.parameters)
+            entry["term"] = None  # a value of the unit's own, among those of the simulator
         else:
             units = {p.name: p.units for p in unit.parameters}
             entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
