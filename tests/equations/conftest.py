@@ -12,6 +12,7 @@ from emafault.actuator.sensors import SensorNoise
 from emafault.actuator.simulate import time_axis
 from emafault.dataset import simulate_and_measure
 from emafault.effects import EFFECTS
+from emafault.equations.diagnose import diagnose
 from emafault.equations.machine import ReferenceActuator
 from emafault.equations.signals import Signals
 from emafault.io.recording import Recording
@@ -26,6 +27,8 @@ COMMANDS = {
 }
 EVERY = 5  # samples, of which one is new on a channel slower than the recording
 STEP = {"step": {"amplitude": 0.012, "time": 0.02}}
+PLANS = (("parabolic", 30.0, 0.3), ("reversal", 30.0, 1.1), ("sine", -20.0, 2.0), ("parabolic", -20.0, 4.0))
+COGGING = {"cogging": {"a": 0.004}}
 
 
 def recorded(
@@ -78,6 +81,26 @@ def lines(x):
 def machine_of(recordings, exclude=()):
     """The diagnosis' view of recordings by name."""
     return ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, NOISE) for n, r in recordings.items()}, exclude)
+
+
+def bench(effects=None, actuator=ACTUATOR):
+    """Four healthy recordings of one unit."""
+    return {
+        f"r{n}.nc": recorded(command, effects, (0.0,) * 5 + (dT,), seed=n, actuator=actuator, theta_0=theta_0)
+        for n, (command, dT, theta_0) in enumerate(PLANS)
+    }
+
+
+def verdict_of(recordings, **options):
+    """Verdict on recordings, the fourth of which confirms."""
+    names = list(recordings)
+    return diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, **options).verdict
+
+
+@pytest.fixture(scope="session")
+def cogging():
+    """Verdict on a unit with cogging."""
+    return verdict_of(bench(COGGING))
 
 
 @pytest.fixture

@@ -17,8 +17,7 @@ from emafault.reporting.retrained import write_with_section
 from emafault.reporting.written import SCHEMA_FILE
 from emafault.study.retrain import retrain_network
 
-from .conftest import recorded
-from .test_diagnose import bench
+from .conftest import bench, recorded
 
 EFFECT = {"magnet_temperature": {"alpha_m": -8e-4}}
 
