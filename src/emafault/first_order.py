@@ -6,6 +6,7 @@ from .compiled import compiled
 
 MOST = 0.95  # largest pole of a recursion that undoes a lag
 LEAST = 1e-6  # interval, of a constant that does anything
+FADED, LONGEST = 1e-4, 500  # of a response: what is left at its end, and intervals that it has at most
 
 
 @compiled
@@ -61,3 +62,10 @@ def filtered(x: np.ndarray, constant: float) -> np.ndarray:
     at_end = x[0] + followed(x - x[0], 1.0 - decay, decay)
     before = np.concatenate([x[:1], at_end[:-1]])
     return x + (before - x) * (constant * (1.0 - decay))
+
+
+def response(constant: float) -> np.ndarray:
+    """(interval,) what :func:`filtered` makes of one interval of one, in that interval and those that follow."""
+    impulse = np.zeros(min(int(-np.log(FADED) * constant) + 4, LONGEST))
+    impulse[1] = 1.0
+    return filtered(impulse, constant)[1:]

@@ -161,6 +161,39 @@ def test_one_of_variants_that_look_alike_near_off_is_the_best_at_its_own_optimum
     assert bench.point["c"] == 0.0 and bench.point["d"] == pytest.approx(0.5, abs=0.1)
 
 
+def test_an_effect_far_from_its_secant_takes_the_place_of_a_form_that_looks_like_it_from_off():
+    """The linear model has it at its library's size alone, where it looks another way than where it is."""
+
+    class Shaped(Machine):
+        form, tau = Parameter("f", 0.0, 0.0, 1.0), Parameter("s.t", 0.0, 0.0, 1.0)
+        secant = Parameter("s#0", 0.0, 0.0, 2.0, secant={"s.t": 2.0})
+        parameters = {p.name: p for p in (Parameter("a", 0.0, 0.0, 1.0), form, tau, secant)}  # noqa: RUF012
+        units = (
+            Unit("s", "structural", ("torque",), [Variant([secant])], Variant([tau])),
+            Unit("~lag", "form", ("torque",), [Variant([form])], among=10.0),
+        )
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other, free = np.random.default_rng(6).standard_normal((4, ROWS))
+
+            def made(t):
+                return t * one + 0.2 * t**2 * other
+
+            t = values.get("s.t", 0.0)
+            columns = {"a": free, "f": one, "s#0": made(2.0), "s.t": one + 0.4 * t * other}
+            residual = noise + values["a"] * free + values.get("f", 0.0) * one + made(t) - made(0.3)
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    bench, both = Bench(Shaped(), ["r"]), Model((Choice("s", 0, 1.0), Choice("~lag", 0, 1.0)))
+    normal = bench.normal(bench.linearise(both, corrected=False), both)
+    search = bench._searched(normal, remainders=False)
+    assert search.ranked()[0].units == ("~lag",)
+    assert bench._leave_out(search, normal)
+    assert bench.on == {"s"} and bench.point["s.t"] == pytest.approx(0.3, abs=0.05)
+    again = bench._searched(bench.normal(bench.linearise(both, corrected=False), both), remainders=False)
+    assert again.ranked()[0].units == ("s",)
+
+
 def test_a_step_takes_out_what_the_point_holds_of_another_variant():
     """The linear model has it off; left where it was, both would act."""
 

@@ -75,6 +75,18 @@ def test_what_a_unit_is_beyond_its_tolerance_and_the_library_does_not_list_is_to
     assert yaml.safe_load(text)["effects"]["inertia"]["scale"] == pytest.approx(1.25, abs=0.02)
 
 
+def test_a_filter_that_the_controller_sees_and_the_library_lacks_is_no_delay_of_the_controller():
+    recordings = bench({"speed_latency": {"tau": 3e-4}})
+    verdict = verdict_of(recordings, exclude=all_but("cogging", "control_delay", "speed_scale", "angle_offset"))
+    assert verdict["simulator"]["after"]["speed_latency"]["tau"] == pytest.approx(3e-4, rel=0.05)
+    assert "not simulated" not in experiment_text(verdict, verdict["simulator"]["after"], "again")
+    assert verdict["verdict"] == "described" and verdict["which"][0]["effects"] == []
+    (told,) = verdict["discovered"]
+    ends = told["parameters"]["lag.speed_sensor_filtered"]
+    assert ends["low"] < 1.5 < ends["high"] and ends["units"] == "interval"
+    assert told["sentence"].endswith("1.5 intervals, and the controller sees it so.")
+
+
 def test_the_seal_can_be_recomputed(cogging):
     sealed = dict(cogging["sealed"])
     digest = sealed.pop("digest")

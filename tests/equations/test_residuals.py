@@ -128,6 +128,7 @@ RECORDER = {
     "lag of the currents": ({"place": "current", "form": "lag", "lag": 0.5}, {"lag.current_late": 0.5}),
     "lag of the speed": ({"place": "speed", "form": "lag", "lag": 0.7}, {"lag.speed_late": 0.7}),
     "a speed that is early": ({"place": "speed", "form": "lag", "lag": -0.7}, {"lag.speed_early": 0.7}),
+    "filter of the speed": ({"place": "speed", "form": "low_pass", "delay": 4.0}, {"lag.speed_filtered": 4.0}),
     "lag of one current": ({"place": "current_b", "form": "lag", "lag": 0.3}, {"lag.current_b_late": 0.3}),
     "lag of one voltage": ({"place": "voltage_c", "form": "lag", "lag": -0.4}, {"lag.voltage_c_early": 0.4}),
     "filter of the currents": ({"place": "current", "form": "low_pass", "delay": 0.3}, {"lag.current_filtered": 0.3}),
@@ -144,6 +145,19 @@ def test_the_controller_does_not_see_what_a_recorder_makes_of_a_signal(fault):
     recording = recorded("reversal", unlisted=(entry,))
     machine = machine_of({"a.nc": recording})
     assert mean_squares(machine, truth(machine, recording) | values)["control"] < 1.3
+
+
+def test_the_controller_sees_the_speed_as_its_sensor_makes_it():
+    recording = recorded("reversal", effects={"speed_latency": {"tau": 2e-3}})
+    machine = machine_of({"a.nc": recording})
+    off = truth(machine, recording)
+    by_sensor, by_recorder = (
+        mean_squares(machine, off | {f"lag.{channel}_filtered": 10.0}) for channel in ("speed_sensor", "speed")
+    )
+    assert by_sensor["sensor_speed"] == by_recorder["sensor_speed"] < 1.2
+    assert by_sensor["control"] < 1.3 < by_recorder["control"]
+    late = [mean_squares(machine, off | {f"lag.{c}_late": 1.0})["sensor_speed"] for c in ("speed_sensor", "speed")]
+    assert late[0] == late[1]
 
 
 def test_what_a_point_takes_off_the_angle_leaves_the_noise_as_it_is():

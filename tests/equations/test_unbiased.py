@@ -230,11 +230,18 @@ def test_the_lag_of_an_angle_shows_in_the_speed_as_the_sensor_makes_it(tau):
     assert moved[inside] @ column[inside] / (column[inside] @ column[inside]) == pytest.approx(1.0, abs=0.03)
 
 
-@pytest.mark.parametrize("tau, early", [(0.0, 0.4), (3e-4, 0.3)])
-def test_what_makes_a_speed_early_makes_the_angle_s_noise_another(tau, early):
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"lag.speed_early": 0.4},
+        {"speed_latency.tau": 3e-4, "lag.speed_early": 0.3},
+        {"lag.speed_filtered": 2.0, "lag.speed_sensor_late": 0.7},
+    ],
+)
+def test_what_makes_a_speed_early_or_late_makes_the_angle_s_noise_another(values):
     machine = machine_of({"a.nc": recorded("parabolic", interval=1e-4)})
     at = {n: p.off for n, p in machine.parameters.items()}
-    at |= {"speed_latency.tau": tau, "lag.speed_early": early}
+    at |= values
     one, other = (
         next(b for b in machine.blocks(at, "a.nc", disturbed, ()) if b.equation == "sensor_speed")
         for disturbed in (False, True)

@@ -344,21 +344,25 @@ class Bench(Describing):
     def _listed_instead(self, search: Search, best: Model) -> list[Model]:
         """A set with each of the likeliest listed effects in the place of each of its described forms.
 
-        A far optimum may look from here less like the effect that it is than like a form.
+        A far optimum may look from here less like the effect that it is than like a form. In the place of one that no
+        scan has proposed, that is so of effects by secants alone, as far as they explain something there.
         """
         out = []
-        for form in (f.id for f in self.described if f.id in best.units):
+        proposed = {f.id for f in self.described}
+        for form in (u for u in best.units if self._kind(u) == "form"):
             rest = tuple((c.unit, c.variant) for c in best.choices if c.unit != form)
             sets = [
                 (*rest, m)
                 for m in search.candidates
                 if self._kind(m[0]) in LISTED and m[1] < OTHER_FORM and m[0] not in best.units
+                if form in proposed or self._by_secant(m[0])
             ]
+            least = -np.inf if form in proposed else search.fit(rest).log_posterior
             likeliest: dict[str, Model] = {}  # variant of each effect
             for members in sets:
                 if np.isfinite(search.log_prior(members)):
                     found, effect = search.fit(members), members[-1][0]
-                    if effect not in likeliest or found.log_posterior > likeliest[effect].log_posterior:
+                    if found.log_posterior > (likeliest[effect].log_posterior if effect in likeliest else least):
                         likeliest[effect] = found
             out += sorted(likeliest.values(), key=lambda m: -m.log_posterior)[:SINGLES]
         return out

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
-from ..first_order import LEAST, ahead, filtered, smoothed
+from ..first_order import LEAST, ahead, filtered, response, smoothed
 from ..switches import direction, turning
 from .dual import Dual, Number
 from .point import Point, effect_name
@@ -66,6 +66,13 @@ def recorded_late(p: Point, channel: str, x: Dual, size: int, phase: str = "") -
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
     return out
+
+
+def response_of(p: Point, channel: str) -> np.ndarray:
+    """(interval,) what a channel that lags or filters records of one interval of one."""
+    late, early, _, constant = (float(x.value) for x in _late(p, channel, ""))
+    shifted = np.convolve([1.0 - late, late], [early, 1.0 - early])
+    return np.convolve(shifted, response(constant)) if constant > LEAST else shifted
 
 
 def through(x: Dual, operate: Callable[[np.ndarray, float], np.ndarray], amount: Dual, size: int) -> Dual:

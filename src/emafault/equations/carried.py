@@ -15,6 +15,7 @@ from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
 from .acquisition import GAIN_NAMES
 from .parameters import BEYOND
+from .sensor_speed import SENSOR
 from .telling import subject
 
 Entry = dict[str, Any]
@@ -34,6 +35,7 @@ CONTROLLER: dict[str, Callable[[float], Entry]] = {
 }
 #: how a channel comes late -> form
 SMOOTH = {"smoothed": "smoothing", "filtered": "low_pass"}
+LATE_SENSOR = f"lag.{SENSOR}_"  # beginning of the names of what comes late before the controller takes it
 
 
 def of_form(
@@ -90,7 +92,9 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
         ((name, amount),) = values.items()
-        way = name.rpartition("_")[2]
+        late, _, way = name.rpartition("_")
+        if late == SENSOR:  # a channel of the recorder does not make what the controller sees too: see ``of_sensor``
+            return None
         if way in SMOOTH:
             return _rounded({"place": channel, "form": SMOOTH[way], "delay": amount})
         return _rounded({"place": channel, "form": "lag", "lag": -amount if way == "early" else amount})
@@ -132,6 +136,12 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     return None
 
 
+def of_sensor(values: Mapping[str, float], interval: float) -> float:
+    """Time constant (s) of a filter of the speed that is as late as what the speed's sensor was found to be; recordings
+    have an ``interval`` (s)."""
+    return interval * sum(x for n, x in values.items() if n.startswith(LATE_SENSOR))
+
+
 def _means(own: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """Of what recordings have of their own, by name; all have the same."""
     return {n: float(np.mean([v[n] for v in own.values()])) for n in next(iter(own.values()))}
@@ -143,9 +153,9 @@ def entries(verdict: Mapping[str, Any]) -> list[Entry]:
 
 
 def left_out(verdict: Mapping[str, Any]) -> list[str]:
-    """Sentences of what a verdict describes and the simulators do not carry; the unit's own values they have."""
-    missing = [d for d in verdict["discovered"] if not d.get("term")]
-    return [str(d["sentence"]) for d in missing if not d.get("unit", "").startswith(BEYOND)]
+    """Sentences of what a verdict describes and the simulators do not carry; values of the catalogue they have."""
+    missing = [d for d in verdict["discovered"] if not d.get("term") and not d.get("unit", "").startswith(BEYOND)]
+    return [str(d["sentence"]) for d in missing if not any(n.startswith(LATE_SENSOR) for n in d.get("parameters", ()))]
 
 
 def _rounded(value: Any) -> Any:

@@ -16,6 +16,7 @@ from .acquisition import GAIN_NAMES, drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
 from .position import SCALED
+from .sensor_speed import SENSOR
 from .telling_chain import channel_in_words
 
 Undo = Callable[[Recording], Recording]
@@ -53,7 +54,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
             x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name, form.channel), form.values)
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
             yield words, partial(_less, channel=channel, x=x)
-    for quantity in ("voltage", "current", "output", "angle", "bus_voltage"):
+    for quantity in ("voltage", "current", "output", "speed", "angle", "bus_voltage"):
         late = [u for u in told if u == f"~lag_{quantity}" or u.startswith(f"~lag_{quantity}_")]
         if late:
             words = f"lag of the {', '.join(channel_in_words(u.removeprefix('~lag_')) for u in sorted(late))}"
@@ -173,6 +174,9 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
 
     if quantity == "output":
         return replace(recording, output_position=of(recording.output_position)[0])
+    if quantity == "speed":
+        speed = of(recording.rotor_speed)[0]
+        return replace(recording, rotor_speed=np.asarray(undone(at, SENSOR, speed, rates(speed, None)[0]).value))
     if quantity == "angle":
         return replace(recording, rotor_angle=of(recording.rotor_angle)[0])
     if quantity == "bus_voltage":

@@ -70,7 +70,7 @@ class ReferenceActuator:
         self.units = [
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
-        self.units += [*measuring_chain(actuator, self.recordings, self.reference), *controller(actuator)]
+        self.units += [*measuring_chain(actuator, self.recordings, self.reference, exclude), *controller(actuator)]
         lacking = [e for e in self.catalogue.values() if e.id in exclude]
         self.units += beyond_tolerance(lacking, actuator, self.parameters)
         for unit in self.units:

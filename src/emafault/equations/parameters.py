@@ -1,6 +1,6 @@
 """What the equations are fitted in: nuisances, effects and faults of the measuring chain, with their priors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..effects.scaling import scale
 from ..switches import TURN
 from . import acquisition, commutation, position
 from .point import SEEDED
+from .sensor_speed import SENSOR
 from .signals import REST, Signals
 from .terms import TERMS
 
@@ -148,30 +149,32 @@ def beyond_tolerance(
     return [replace(u, id=BEYOND + u.id, kind="form", among=float(len(of))) for u in units]
 
 
-def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
+def measuring_chain(
+    a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str, lacking: Collection[str] = ()
+) -> list[Unit]:
     """Faults of the measuring chain with parameters of their own: lag, crosstalk, curves, drop, drift, gain.
 
-    ``reference``: the recording that gains of all phases alike are told against in the others.
+    Parameters
+    ----------
+    reference : the recording that gains of all phases alike are told against in the others
+    lacking : effects that the library does not have
     """
     out = []
-    # that the speed's is filtered is in the catalogue; an angle is a sample, and no mean that a logger smooths
     phases = [f"{quantity}_{j}" for quantity in ("voltage", "current") for j in PER_PHASE]
-    only = {"speed": ("late", "early"), "angle": ("late", "early"), **dict.fromkeys(phases, acquisition.OF_ONE_PHASE)}
+    # an angle is a sample, and no mean that a logger smooths
+    only = {"speed": ("late", "early", "filtered"), "angle": ("late", "early")}
+    only |= dict.fromkeys(phases, acquisition.OF_ONE_PHASE)
+    # the controller takes the speed behind its sensor; that this one filters is in the catalogue
+    of_sensor = ("late", "filtered") if "speed_latency" in lacking else ("late",)
     channels = ("voltage", "current", "output", "speed", "angle", "bus_voltage", *phases)
     for channel in channels:
         ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
-        variants = [
-            Variant(
-                [Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")],
-                [1],
-                LEAST_LAG,
-                [LEAST_LAG] if way in MADE else (),
-            )
-            for way in ways
-        ]
+        variants = [_late(channel, way) for way in ways]
+        if channel == "speed":
+            variants += [_late(SENSOR, way) for way in of_sensor]
         shows = _shows(channel.partition("_")[0] if channel in phases else channel)
         among = float(len(channels))
-        out.append(Unit(f"~lag_{channel}", "form", shows, variants, among=among, alike=set(MADE) <= set(ways)))
+        out.append(Unit(f"~lag_{channel}", "form", shows, variants, among=among, alike=bool(set(MADE) & set(ways))))
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):
@@ -186,6 +189,12 @@ def measuring_chain(a: ActuatorParameters, recordings: Mapping[str, Signals], re
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
         out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
     return out + _drifts(recordings, reference)
+
+
+def _late(channel: str, way: str) -> Variant:
+    """A way in which a channel comes late, or early."""
+    parameter = Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")
+    return Variant([parameter], [1], LEAST_LAG, [LEAST_LAG] if way in MADE else ())
 
 
 def _shows(channel: str) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from .acquisition import drifted, recorded_late
+from .acquisition import drifted, recorded_late, response_of
 from .dual import Dual
 from .point import State, effect_name
 from .signals import Signals, odd
@@ -11,6 +11,7 @@ from .terms import with_hook
 
 BESIDE = 1e-2  # s, before and after a sample, between which the speed must sweep over what noise reaches
 REACHES = 3.0  # standard deviations, that the noise of a speed reaches to either side
+SENSOR = "speed_sensor"  # channel of what comes late before the controller takes it
 LITTLE = 0.01  # of the variance: covariances below it do not count
 
 
@@ -34,7 +35,7 @@ def seen_speed(state: State, w: Dual) -> Dual:
     """What the sensor makes of a true speed (rad/s)."""
     for m in with_hook("speed"):
         w = m.speed(state.p.of(effect_name(m)), state.rec, w)
-    return w
+    return recorded_late(state.p, SENSOR, w, state.rec.size)
 
 
 def seen_rate(state: State, x: np.ndarray) -> np.ndarray:
@@ -49,8 +50,8 @@ def noise_bands(state: State) -> list[np.ndarray]:
     of_angle = np.array([1.0, -1.0])
     for m in with_hook("response"):
         of_angle = np.convolve(of_angle, m.response(state.p.of(effect_name(m)), rec))
-    late, early = (float(state.p(f"lag.speed_{way}").value) for way in ("late", "early"))
-    of_angle = np.convolve(np.convolve(of_angle, [1.0 - late, late]), [early, 1.0 - early])
+    for channel in ("speed", SENSOR):
+        of_angle = np.convolve(of_angle, response_of(state.p, channel))
     angle = (rec.noise.angle / rec.interval) ** 2 * np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
     rounded = (0.5 * rec.speed_step) ** 2  # next to a change
     white = rec.noise.speed**2 + rounded

@@ -7,13 +7,18 @@ from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
 from .acquisition import GAIN_NAMES, full_range
+from .sensor_speed import SENSOR
 from .telling import Z
 
 LATE = {
     "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
     "filtered": "is behind a first-order filter with a time constant of {}",
 }  # fmt: skip
-CHANNELS = {"output": "output position", "bus_voltage": "bus voltage"}  # words of those that have others
+CHANNELS = {
+    "output": "output position",
+    "bus_voltage": "bus voltage",
+    SENSOR: "speed sensor's",
+}  # words of those that have others
 CONTROLLER = {
     "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
     "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
@@ -166,8 +171,9 @@ def _scale(fault: Fault) -> Told:
 
 def _lag(fault: Fault) -> Told:
     ((at, amount),) = fault.values.items()
-    late = LATE[at.rpartition("_")[2]].format(f"{amount:.2g} intervals")
-    return Told(f"the {fault.whose} {late}", "lag")
+    channel, _, way = at.partition(".")[2].rpartition("_")
+    also = ", and the controller sees it so" * (channel == SENSOR)
+    return Told(f"the {fault.whose} {LATE[way].format(f'{amount:.2g} intervals')}{also}", "lag")
 
 
 KINDS: dict[str, Callable[[Fault], Told]] = {

@@ -321,4 +321,8 @@ def _simulator(bench: Bench, values: Mapping[str, float], found: Sequence[Mappin
         effect = p["effect"]
         if p["name"] in EFFECTS[effect].parameters:
             out.setdefault(effect, {})[p["name"]] = float(p["value"])
+    late = carried.of_sensor(values, bench.machine.recordings[bench.recordings[0]].interval)
+    if late:
+        found_late = out.setdefault("speed_latency", {"tau": 0.0})
+        found_late["tau"] += late
     return out

@@ -1,22 +1,17 @@
 """The measured speed is first-order filtered."""
 
-import numpy as np
-
+from ... import first_order
 from ...first_order import filtered
 
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
 SHORTEST = 1e-6  # s
 STEP = 1e-3  # of an interval, of which the derivative is taken
-FADED, LONGEST = 1e-4, 500  # of a response: what is left at its end, and intervals that it has at most
 
 
 def response(p, rec):
     """Recorded speed after one interval's speed of one, in that interval and those that follow."""
-    tau, h = max(p("tau").value, 0.0), rec.interval
-    impulse = np.zeros(min(int(-np.log(FADED) * tau / h) + 4, LONGEST))
-    impulse[1] = 1.0
-    return filtered(impulse, tau / h)[1:]
+    return first_order.response(max(p("tau").value, 0.0) / rec.interval)
 
 
 def speed(p, rec, w):
