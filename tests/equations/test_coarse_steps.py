@@ -6,7 +6,6 @@ import pytest
 from .conftest import COGGING, all_but, bench, in_steps, verdict_of
 
 COARSE = {
-    "currents": ({"phase_current": 0.05, "phase_current_end": 0.05}, {}, "sensor_current"),
     "currents beside an effect": ({"phase_current": 0.09, "phase_current_end": 0.09}, COGGING, "sensor_current"),
     "output beside an effect": ({"output_position": 1e-4}, COGGING, "position"),
     "encoder of 4096 counts beside an effect": ({"rotor_angle": 2.0 * np.pi / 4096.0}, COGGING, None),

@@ -132,3 +132,11 @@ def test_a_constant_speed_tells_no_delay_from_the_zero_of_the_angle(shop):
     for seed in range(4):
         slow = shop.record("ramp", {"speed": 0.0504}, 75.0, "unknown", seed=seed, **strong)
         refuse_mistaken("r.nc", slow, shop.actuator)
+
+
+def test_a_delay_that_makes_up_for_the_zero_at_the_speed_of_the_recording_is_none(shop):
+    """At 1 ms a ramp had been 14 degrees ahead, by as much late, and refused."""
+    seeded = {"fault": (0.005, 0.008, 0.017, 0.008, 0.006), "theta_0": 0.5318, "duration": 0.69, "interval": 1e-3}
+    for seed in range(4):
+        fast = shop.record("ramp", {"speed": 0.45237}, -22.9, "seeded", seed=seed, **seeded)
+        refuse_mistaken("r.nc", replace(fast, phase_current_end=None), shop.actuator)

@@ -48,8 +48,8 @@ def bench():
     return small()
 
 
-def found(bench, **wrong):
-    return scores(run_draws([bench], 60, SAMPLES, 3, **wrong), SAMPLES, ARMS)["completed"]
+def found(bench, draws=60, **wrong):
+    return scores(run_draws([bench], draws, SAMPLES, 3, **wrong), SAMPLES, ARMS)["completed"]
 
 
 def worst(f):
@@ -62,12 +62,12 @@ def test_the_right_model_passes(bench):
 
 
 def test_a_wrong_noise_fails(bench):
-    p, _ = worst(found(bench, noise=2.0))
+    p, _ = worst(found(bench, 24, noise=2.0))
     assert p < 1e-3
 
 
 def test_wrong_widths_fail(bench):
-    p, _ = worst(found(bench, width=5.0))
+    p, _ = worst(found(bench, 40, width=5.0))
     assert p < 1e-3
 
 

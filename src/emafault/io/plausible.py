@@ -185,12 +185,14 @@ def refuse_bus(path: str, recording: Recording, actuator: ActuatorParameters) ->
 
 @dataclass(frozen=True)
 class _Fitted:
-    """R (ohm), K (V s/rad, complex), the offsets of the voltages (phase,) and their standard errors."""
+    """R (ohm), K (V s/rad, complex), the offsets of the voltages (phase,) and their standard errors; ``on_time`` is the
+    argument of K (rad) were the angle on time."""
 
     R: float
     R_error: float
     K: complex
     K_error: float
+    on_time: float
     offset: np.ndarray
     offset_error: float
 
@@ -222,7 +224,8 @@ def refuse_implausible(path: str, recording: Recording, actuator: ActuatorParame
             f"{path}: phase_voltage is {of_k:.3g} times the back-EMF that this actuator has at this speed; "
             f"{_mistaken(of_k, 'its unit')}"
         )
-    if k_known and certain and abs(angle) > LARGEST_ANGLE:
+    # a zero and a delay that make up for each other at the speeds of the recording are neither
+    if k_known and certain and min(abs(angle), np.sign(angle) * found.on_time) > LARGEST_ANGLE:
         where, size = "ahead of" if angle < 0.0 else "behind", np.rad2deg(abs(angle))
         raise InputError(
             f"{path}: rotor_angle is {size:.0f} electrical degrees {where} the back-EMFs; its zero is mistaken"
@@ -272,11 +275,13 @@ def _fit(r: Recording, a: ActuatorParameters) -> _Fitted | None:
     A = np.stack([np.concatenate([c.real[moving], c.imag[moving]]) for c in columns], axis=1)
     b = np.concatenate([rhs.real[moving], rhs.imag[moving]])
     x, error = _least_squares(A, b)
+    A[:, LATE] = 0.0
+    on_time = _least_squares(A, b)
     if abs(x[LATE]) > LATEST * a.pole_pairs * dt * abs(complex(x[2], x[3])):
-        A[:, LATE] = 0.0
-        x, error = _least_squares(A, b)
+        x, error = on_time
     offset = np.real((x[5] + 1j * x[6]) * np.exp(-1j * AXIS))
-    return _Fitted(x[0], error[0], complex(x[2], x[3]), max(error[2:4]), offset, max(error[5:7]))
+    angle = float(np.arctan2(on_time[0][3], on_time[0][2]))
+    return _Fitted(x[0], error[0], complex(x[2], x[3]), max(error[2:4]), angle, offset, max(error[5:7]))
 
 
 def _least_squares(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
