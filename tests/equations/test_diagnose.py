@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 import yaml
 
+from emafault.equations import machine
 from emafault.equations.diagnose import diagnose
 from emafault.equations.handover import experiment_text
 from emafault.errors import InputError
@@ -73,6 +74,14 @@ def test_what_a_unit_is_beyond_its_tolerance_and_the_library_does_not_list_is_to
     text = experiment_text(verdict, verdict["simulator"]["after"], "again")
     assert "not simulated" not in text
     assert yaml.safe_load(text)["effects"]["inertia"]["scale"] == pytest.approx(1.25, abs=0.02)
+
+
+def test_what_the_fit_can_only_have_far_beyond_its_prior_is_no_absence_of_a_gap(monkeypatch):
+    """The linear model has a nuisance at seven tolerances, the fit at four; no remainder speaks against it."""
+    monkeypatch.setattr(machine, "beyond_tolerance", lambda *_: [])
+    verdict = verdict_of(bench({"inertia": {"scale": 1.25}}), exclude=all_but("cogging", "friction_level"))
+    assert verdict["verdict"] == "unknown" and verdict["shrinks"]["signal"]["after"] > 1.05
+    assert any("torque equation leaves more than noise" in d["sentence"] for d in verdict["discovered"])
 
 
 def test_a_filter_that_the_controller_sees_and_the_library_lacks_is_no_delay_of_the_controller():

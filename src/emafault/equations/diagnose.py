@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import SensorNoise
 from ..diagnosis import wandering
@@ -127,7 +129,8 @@ def diagnose(
     models, held_out = held_to_account(every, all_fit, named, explored, wanders)
     all_fit = replace(all_fit, models=models)
     quality = {n: quality[n] if n in quality else seen(r, exclude) for n, r in recordings.items()}
-    final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders)
+    beyond = {e: max(odds, wanders.get(e, -np.inf)) for e, odds in held_out.misfits.items()}
+    final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders | beyond)
     fitted = Fitted(whole, every, all_fit, final, held_out)
     verdict = verdict_of(name, split, fitted, sealed, recordings, quality)
     return Diagnosed.of(fitted, verdict | {"warnings": unconfirmed(fitted)}, own)

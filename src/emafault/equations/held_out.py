@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from ..diagnosis import predictive
 from ..diagnosis.closure import Ladder
 from ..diagnosis.constancy import log_odds_of_another_cause, log_odds_of_change
 from ..diagnosis.dispersion import overdispersion
@@ -34,12 +35,14 @@ class HeldOut:
     """The fit to the explored recordings, and what the others say of names.
 
     ``ratios``: log predictive ratio by effect and form; ``changes``: by effect, log odds that it has another size in
-    each recording.
+    each recording; ``misfits``: by equation, log odds that other values than the fitted ones act there: see
+    ``predictive``.
     """
 
     explored: Explored
     ratios: Mapping[str, float]
     changes: Mapping[str, float]
+    misfits: Mapping[str, float]
 
 
 def held_to_account(
@@ -106,7 +109,16 @@ def held_to_account(
         sets.add_without(effect, True, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
-    return models, HeldOut(explored, ratios, changes)
+    return models, HeldOut(explored, ratios, changes, _misfits(explored, account.leading))
+
+
+def _misfits(explored: Explored, model: Model) -> dict[str, float]:
+    """Log odds by equation that the confirm recordings have other values than those of a set fitted to the explored
+    ones."""
+    inserted = explored.bench.inserted(model, explored.fit.normal)
+    also = [n for n in model.deviations if is_parameter(n)]
+    confirm = explored.ladder.blocks(inserted.values, also=also, inserted=inserted)
+    return predictive.log_odds(explored.bench, explored.fit, model, confirm)
 
 
 def _ask_remainders(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:
