@@ -164,14 +164,17 @@ def measuring_chain(
     # an angle is a sample, and no mean that a logger smooths
     only = {"speed": ("late", "early", "filtered"), "angle": ("late", "early")}
     only |= dict.fromkeys(phases, acquisition.OF_ONE_PHASE)
-    # the controller takes the speed behind its sensor; that this one filters is in the catalogue
-    of_sensor = ("late", "filtered") if "speed_latency" in lacking else ("late",)
+    # the controller takes the speed behind its sensor; that this one filters is in the catalogue, and by less than an
+    # interval a record does not tell a delay from a filter
+    filters = "speed_latency" not in lacking
     channels = ("voltage", "current", "output", "speed", "angle", "bus_voltage", *phases)
     for channel in channels:
         ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
         variants = [_late(channel, way) for way in ways]
         if channel == "speed":
-            variants += [_late(SENSOR, way) for way in of_sensor]
+            variants += (
+                [_late(SENSOR, "late", 1.0)] if filters else [_late(SENSOR, way) for way in ("late", "filtered")]
+            )
         shows = _shows(channel.partition("_")[0] if channel in phases else channel)
         among = float(len(channels))
         out.append(Unit(f"~lag_{channel}", "form", shows, variants, among=among, alike=bool(set(MADE) & set(ways))))
@@ -191,10 +194,11 @@ def measuring_chain(
     return out + _drifts(recordings, reference)
 
 
-def _late(channel: str, way: str) -> Variant:
-    """A way in which a channel comes late, or early."""
+def _late(channel: str, way: str, least: float = 0.0) -> Variant:
+    """A way in which a channel comes late, or early, by at least so many intervals."""
+    least = max(least, LEAST_LAG if way in MADE else 0.0)
     parameter = Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")
-    return Variant([parameter], [1], LEAST_LAG, [LEAST_LAG] if way in MADE else ())
+    return Variant([parameter], [1], max(least, LEAST_LAG), [least] if least else ())
 
 
 def _shows(channel: str) -> tuple[str, ...]:
