@@ -9,7 +9,7 @@ from .described import Described
 from .evidence import SETTLED, Normal
 from .normal import NormalEquations
 from .point import Place, is_parameter
-from .search import Search
+from .search import NEAR, Search
 from .sets import OTHER_FORM, Model
 
 STEPS = 3  # of a set to its own optimum
@@ -204,7 +204,7 @@ class Settling(NormalEquations):
 
     def _by_own_variants(self, model: Model) -> Model:
         """A set that the point has settled at, with the variant of each unit whose variants look alike near off that is
-        best at its own optimum, where the point moves."""
+        best at its own optimum, where the point moves; one that its first step does not bring near is not followed."""
         alike = {u.id: u for u in self.units if u.alike}
         for unit in (alike[u] for u in model.units if u in alike):
             ends = [(model, self.here())]
@@ -214,8 +214,9 @@ class Settling(NormalEquations):
                     continue
                 self.go_to(ends[0][1])
                 self.point |= {p.name: p.off for p in unit.parameters} | {p.name: amount for p in variant.parameters}
-                other = tuple(replace(c, variant=v) if c.unit == unit.id else c for c in model.choices)
-                ends.append((self.settle(Model(other)), self.here()))
+                other = Model(tuple(replace(c, variant=v) if c.unit == unit.id else c for c in model.choices))
+                if self._fitted(other)[0].log_posterior > ends[0][0].log_posterior - NEAR:
+                    ends.append((self.settle(other), self.here()))
             model, place = max(ends, key=lambda e: e[0].log_posterior)
             self.go_to(place)
         return model

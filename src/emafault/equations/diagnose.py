@@ -20,7 +20,7 @@ from ..effects.scaling import scaled
 from ..errors import InputError
 from ..io.enough import FEWEST, spread
 from ..io.recording import Recording
-from .held_out import Explored, held_to_account
+from .held_out import Explored, held_to_account, misfits
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
 from .quality import seen, told
@@ -129,7 +129,7 @@ def diagnose(
     models, held_out = held_to_account(every, all_fit, named, explored, wanders)
     all_fit = replace(all_fit, models=models)
     quality = {n: quality[n] if n in quality else seen(r, exclude) for n, r in recordings.items()}
-    beyond = {e: max(odds, wanders.get(e, -np.inf)) for e, odds in held_out.misfits.items()}
+    beyond = {e: max(odds, wanders.get(e, -np.inf)) for e, odds in misfits(held_out).items()}
     final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders | beyond)
     fitted = Fitted(whole, every, all_fit, final, held_out)
     verdict = verdict_of(name, split, fitted, sealed, recordings, quality)

@@ -35,14 +35,13 @@ class HeldOut:
     """The fit to the explored recordings, and what the others say of names.
 
     ``ratios``: log predictive ratio by effect and form; ``changes``: by effect, log odds that it has another size in
-    each recording; ``misfits``: by equation, log odds that other values than the fitted ones act there: see
-    ``predictive``.
+    each recording; ``leading``: the explored recordings' set that others were compared within, less what is not told.
     """
 
     explored: Explored
     ratios: Mapping[str, float]
     changes: Mapping[str, float]
-    misfits: Mapping[str, float]
+    leading: Model
 
 
 def held_to_account(
@@ -109,12 +108,13 @@ def held_to_account(
         sets.add_without(effect, True, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
-    return models, HeldOut(explored, ratios, changes, _misfits(explored, account.leading))
+    return models, HeldOut(explored, ratios, changes, account.leading)
 
 
-def _misfits(explored: Explored, model: Model) -> dict[str, float]:
-    """Log odds by equation that the confirm recordings have other values than those of a set fitted to the explored
-    ones."""
+def misfits(found: HeldOut) -> dict[str, float]:
+    """Log odds by equation that the confirm recordings have other values than those of the leading set: see
+    ``predictive``."""
+    explored, model = found.explored, found.leading
     inserted = explored.bench.inserted(model, explored.fit.normal)
     also = [n for n in model.deviations if is_parameter(n)]
     confirm = explored.ladder.blocks(inserted.values, also=also, inserted=inserted)
