@@ -1,0 +1,39 @@
+"""What of a measuring chain is undone in recordings, by the values of a diagnosis."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from emafault.equations.corrected import corrected
+from emafault.first_order import filtered
+
+from .conftest import ACTUATOR, recorded
+
+
+def late(x):
+    return x + 0.4 * (np.append(x[:1], x[:-1]) - x)
+
+
+MADE = {
+    "late": (late, {"lag.speed_late": 0.4}, 0.05),
+    "late in the sensor": (late, {"lag.speed_sensor_late": 0.4}, 0.05),
+    "filtered": (lambda x: filtered(x, 3.0), {"lag.speed_filtered": 3.0}, 0.5),
+}
+
+
+@pytest.mark.parametrize("case", MADE)
+def test_a_lag_of_the_speed_is_undone(case):
+    make, values, left = MADE[case]
+    recording = recorded("sine")
+    smooth = gaussian_filter1d(recording.rotor_speed, 10.0)
+    faulty = {"a.nc": replace(recording, rotor_speed=make(smooth))}
+    bench = SimpleNamespace(described=(), machine=SimpleNamespace(actuator=ACTUATOR))
+    found = SimpleNamespace(verdict={"discovered": [{"unit": "~lag_speed"}]}, values=values, bench=bench)
+    undone, what = corrected(found, faulty)
+    assert what == ["lag of the speed channel"]
+    inside = slice(20, -20)
+    off = [np.std((r.rotor_speed - smooth)[inside]) for r in (undone["a.nc"], faulty["a.nc"])]
+    assert off[0] < left * off[1]
