@@ -112,6 +112,9 @@ def test_the_check_of_another_actuator_is_refused(written):
     assert checked_on(identified, path)["same"]
 
 
+SEEDS = {"T0": 40001, "T1": 40011}
+
+
 @pytest.fixture(scope="module")
 def three(tmp_path_factory):
     """Judged cases of the three example actuators, of 28, 48 and 270 V, by name of the file."""
@@ -120,8 +123,9 @@ def three(tmp_path_factory):
         machine, folder = of_file(path), tmp_path_factory.mktemp(path.stem)
         population = population_of(machine.actuator, machine.tolerances())
         noise = SensorNoise(**config.compose()["sensors"])
-        for rung, seeds in (("T0", (40001,)), ("T1", (40011,))):
-            run_cases(rung, seeds, folder, machine.actuator, noise, population=population)
+        # without an effect the reference itself is diagnosed in many other tests
+        for rung in ("T1",) if path.stem.endswith("_48v") else ("T0", "T1"):
+            run_cases(rung, (SEEDS[rung],), folder, machine.actuator, noise, population=population)
         out[path.stem] = score(folder)["rows"]
     return out
 
@@ -131,7 +135,7 @@ def test_what_was_checked_on_the_reference_actuator_holds_on_three(three):
     every = [row for rows in three.values() for row in rows]
     assert all(r["right"] for r in every)
     found = summary(every)
-    assert found["holds"] and found["false_names"] == {"named": 0, "cases": 3}
+    assert found["holds"] and found["false_names"] == {"named": 0, "cases": 2}
 
 
 def test_how_long_it_takes_is_said_before_the_cases(tmp_path, monkeypatch, capsys):
