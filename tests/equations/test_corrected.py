@@ -20,7 +20,7 @@ def late(x):
 MADE = {
     "late": (late, {"lag.speed_late": 0.4}, 0.05),
     "late in the sensor": (late, {"lag.speed_sensor_late": 0.4}, 0.05),
-    "filtered": (lambda x: filtered(x, 3.0), {"lag.speed_filtered": 3.0}, 0.5),
+    "filtered": (lambda x: filtered(x, 3.0), {"lag.speed_filtered": 3.0}, 0.1),
 }
 
 

@@ -13,7 +13,7 @@ from .fit import Bench, Fit
 from .linear import White
 from .model import SETTINGS
 from .point import is_parameter
-from .set_prior import REMAINDER_PRIOR
+from .set_prior import REMAINDER_ODDS
 from .sets import Model
 
 
@@ -37,11 +37,13 @@ def log_odds(bench: Bench, fit: Fit, model: Model, confirm: Sequence[White]) -> 
         if w.equation not in SETTINGS:
             beyond[w.equation] = beyond.get(w.equation, 0.0) + float(w.gram[-1, -1]) - w.count
             rows[w.equation] = rows.get(w.equation, 0) + w.count
-    prior = float(np.log(REMAINDER_PRIOR / (1.0 - REMAINDER_PRIOR)))
     acting: dict[str, set[str]] = {}
     for w in fit.whites:
         power = np.diag(w.gram)
         acting.setdefault(w.equation, set()).update(
             n for n, p in zip(w.names, power, strict=False) if p > 0.0 and n in free and "@" not in n
         )
-    return {e: prior + 0.5 * (x - len(acting.get(e, ())) * float(np.log(max(rows[e], 1)))) for e, x in beyond.items()}
+    return {
+        e: REMAINDER_ODDS + 0.5 * (x - len(acting.get(e, ())) * float(np.log(max(rows[e], 1))))
+        for e, x in beyond.items()
+    }

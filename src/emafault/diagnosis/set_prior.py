@@ -12,6 +12,7 @@ from .sets import OTHER_FORM
 SIZE_PRIOR = (0.40, 0.35, 0.15, 0.10)  # of no, one, two, three listed effects
 ONE_MORE_FORM = 0.3  # of a bench with any number of described forms, to have one more
 REMAINDER_PRIOR = 0.05  # of each equation to have one
+REMAINDER_ODDS = float(np.log(REMAINDER_PRIOR / (1.0 - REMAINDER_PRIOR)))  # the same as log odds
 OTHER_FORM_PRIOR = 0.2  # of an effect, to take one
 
 

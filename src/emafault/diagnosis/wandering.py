@@ -12,7 +12,7 @@ from .constancy import log_mean
 from .evidence import CLEAR
 from .fit import Bench
 from .model import SETTINGS
-from .set_prior import REMAINDER_PRIOR
+from .set_prior import REMAINDER_ODDS
 
 
 def log_odds(bench: Bench, confirm: Sequence[str] = ()) -> dict[str, float]:
@@ -23,17 +23,16 @@ def log_odds(bench: Bench, confirm: Sequence[str] = ()) -> dict[str, float]:
     bench : whose weights are of what the leading set leaves
     confirm : recordings of it that confirm: what the others do not show, or these do not clearly, is not there
     """
-    prior = np.log(REMAINDER_PRIOR / (1.0 - REMAINDER_PRIOR))
     explored, confirming = (
         _ratios(bench, part) for part in ([r for r in bench.recordings if r not in confirm], confirm)
     )
     out: dict[str, float] = {}
     for equation, ratios in explored.items():
-        out[equation] = log_mean(ratios.tolist()) + float(prior)
+        out[equation] = log_mean(ratios.tolist()) + REMAINDER_ODDS
         if confirm:
-            every = log_mean((ratios + confirming.get(equation, 0.0)).tolist()) + float(prior)
+            every = log_mean((ratios + confirming.get(equation, 0.0)).tolist()) + REMAINDER_ODDS
             shown = out[equation] > 0.0 and every - out[equation] >= CLEAR
-            out[equation] = every if shown else min(out[equation], float(prior))
+            out[equation] = every if shown else min(out[equation], REMAINDER_ODDS)
     return out
 
 
