@@ -1,15 +1,17 @@
 """Gaussian evidence of sets of parameters in closed form, from the normal matrix with the nuisances marginalised."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.special import log_ndtr
 
 from ..compiled import compiled
 
 CLEAR = 3.0  # nats of predictive density that clearly speak for or against (Kass and Raftery 1995, JASA 90, 773)
 SETTLED = 0.5  # nats that one more step to an optimum may still promise
+SQRT_2 = math.sqrt(2.0)
+ASYMPTOTIC = -20.0  # below which the normal distribution function has its asymptotic series to rounding
 MANY = 32  # rows from which on a matrix is factored along its rows
 RIDGES = (0.0, 1e-12, 1e-10, 1e-8)  # of a unit diagonal, the first that makes a matrix definite
 
@@ -107,18 +109,34 @@ def log_evidence(
     if not np.isfinite(value):  # what is left of columns of mere noise may have no definite sign
         return -np.inf, mean, sd
     if signs is not None:
-        value += sided(r, free, signs, found, deviation)
+        value += sided(r.fixed, free, signs, found, deviation)
     return float(value), found, deviation
 
 
-def sided(r: Reduced, free: np.ndarray, signs: np.ndarray, found: np.ndarray, deviation: np.ndarray) -> float:
-    """What priors on one side of off, or on both (``signs`` 0), add to the log evidence of a fit: they are twice as
-    dense there, and the posterior's mass on that side counts."""
-    one = signs != 0
-    if not np.any(one):
-        return 0.0
-    where = found[one] - r.fixed[free[one]]
-    return float(np.sum(np.log(2.0) + log_ndtr(signs[one] * where / deviation[one])))
+@compiled
+def _log_normal(x):
+    """Log of the standard normal distribution function; far below, its asymptotic series (Abramowitz and Stegun 1964,
+    equation 26.2.12)."""
+    if x > 0.0:
+        return math.log1p(-0.5 * math.erfc(x / SQRT_2))
+    if x > ASYMPTOTIC:
+        return math.log(0.5 * math.erfc(-x / SQRT_2))
+    term, series = 1.0, 1.0
+    for k in range(1, 8):
+        term *= -(2 * k - 1) / (x * x)
+        series += term
+    return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) + math.log(series)
+
+
+@compiled
+def sided(fixed, free, signs, found, deviation):
+    """What priors on one side of off (``fixed``), or on both (``signs`` 0), add to the log evidence of a fit: they are
+    twice as dense there, and the posterior's mass on that side counts."""
+    out = 0.0
+    for k in range(len(free)):
+        if signs[k] != 0:
+            out += math.log(2.0) + _log_normal(signs[k] * (found[k] - fixed[free[k]]) / deviation[k])
+    return out
 
 
 @compiled

@@ -31,7 +31,7 @@ class Factored:
         """Value, indices, means and standard deviations of the set."""
         if not np.isfinite(self.value):
             return -np.inf, self.free, self.mean, self.sd
-        value = self.value + sided(self.r, self.free, self.signs, self.found, self.deviation)
+        value = self.value + sided(self.r.fixed, self.free, self.signs, self.found, self.deviation)
         return value, self.free, self.found, self.deviation
 
     def and_one_more(self, more: np.ndarray) -> "OneMore":
@@ -46,25 +46,38 @@ class OneMore:
         self.of, self.more = of, more
         self.forward, self.back = _complement(of.r.M, of.L, of.free, of.sd, more)
         self.left = of.r.M[np.ix_(more, more)] - self.forward @ self.forward.T
+        self.gradient = of.gradient[more]
 
     def log_evidence(
         self, mean: np.ndarray, sd: np.ndarray, signs: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """As ``log_evidence`` of the set's parameters and then of these: value, indices, means, standard deviations."""
         s = self.of
-        free = np.concatenate([s.free, self.more])
-        means, sds = np.concatenate([s.mean, mean]), np.concatenate([s.sd, sd])
-        if not np.isfinite(s.value):
-            return -np.inf, free, means, sds
-        gain, found, deviation = _grown(
-            self.forward, self.back, self.left, s.z, s.step, s.power, s.gradient[self.more],
-            mean - s.r.fixed[self.more], sd,
+        return _with_more(
+            s.value, self.forward, self.back, self.left, s.z, s.step, s.power, self.gradient, s.r.fixed, s.free, s.mean,
+            s.sd, s.signs, self.more, mean, sd, signs,
         )  # fmt: skip
-        found, deviation = means + sds * found, sds * deviation
-        if not np.isfinite(gain):
-            return -np.inf, free, means, sds
-        value = s.value + gain + sided(s.r, free, np.concatenate([s.signs, signs]), found, deviation)
-        return value, free, found, deviation
+
+
+@compiled
+def _with_more(
+    value, forward, back, left, z, step, power, gradient, fixed, free, mean, sd, signs, more, its_mean, its_sd, its_signs
+):  # fmt: skip
+    """Log evidence, indices, means and standard deviations of a set with further parameters."""
+    both = np.concatenate((free, more))
+    means, sds = np.concatenate((mean, its_mean)), np.concatenate((sd, its_sd))
+    if not np.isfinite(value):
+        return -np.inf, both, means, sds
+    gain, found, deviation = _grown(
+        forward, back, left, z, step, power, gradient, its_mean - fixed[more], its_sd
+    )  # fmt: skip
+    if not np.isfinite(gain):
+        return -np.inf, both, means, sds
+    for k in range(len(both)):
+        found[k] = means[k] + sds[k] * found[k]
+        deviation[k] *= sds[k]
+    sides = sided(fixed, both, np.concatenate((signs, its_signs)), found, deviation)
+    return value + gain + sides, both, found, deviation
 
 
 @compiled

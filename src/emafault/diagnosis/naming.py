@@ -67,10 +67,12 @@ def read(
     acts = {u.id: u.equations for u in units}
     wanders = {e: float(expit(odds)) for e, odds in wandering.items()}
     listed_of = [tuple(sorted({*observed, *(u for u in m.units if kind.get(u) in LISTED)})) for m in models]
-    wandering_of = [_wandering(m, listed, acts, wanders) for m, listed in zip(models, listed_of, strict=True)]
+    wandering_of = _wandering(models, listed_of, acts, wanders)
     inclusion: dict[str, float] = {e: 1.0 for e in observed}
     for model, w, may in zip(models, weights, wandering_of, strict=True):
-        for u, p in {**dict.fromkeys(model.units, 1.0), **may}.items():
+        for u in model.units:
+            inclusion[u] = inclusion.get(u, 0.0) + w
+        for u, p in may.items():
             inclusion[u] = inclusion.get(u, 0.0) + w * p
     inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
@@ -82,7 +84,8 @@ def read(
     of_controller = {u.id for u in units if u.of_controller}
     # a form that is not told is no explanation, and no sign that there is nothing
     undescribed = {u.id for u in units if u.kind == "form"} - {*forms, *of_controller}
-    left = [any(u in undescribed or _is_left(u, kind) for u in m.units) for m in models]
+    left_over = undescribed | {u for u in inclusion if _is_left(u, kind)}
+    left = [not left_over.isdisjoint(m.units) for m in models]
     steady = [float(np.prod([1.0 - p for p in may.values()])) for may in wandering_of]
     mass = _masses(models, weights, listed_of, np.where(left, 0.0, steady), acts)
     of_machine = set(forms) - of_controller
@@ -149,12 +152,23 @@ def _is_left(unit: str, kind: Mapping[str, str]) -> bool:
 
 
 def _wandering(
-    model: Model, listed: Sequence[str], acts: Mapping[str, Sequence[str]], wanders: Mapping[str, float]
-) -> dict[str, float]:
-    """Remainders that a set does not have, with the probabilities that what it leaves wanders so; beside a listed
-    effect that may be the effect's own form."""
-    free = [e for e in wanders if not any(meet(acts.get(u, ()), (e,)) for u in listed)]
-    return {f"remainder:{e}": wanders[e] for e in free if f"remainder:{e}" not in model.units}
+    models: Sequence[Model],
+    listed_of: Sequence[tuple[str, ...]],
+    acts: Mapping[str, Sequence[str]],
+    wanders: Mapping[str, float],
+) -> list[dict[str, float]]:
+    """Of each set the remainders that it does not have, with the probabilities that what it leaves wanders so; beside a
+    listed effect that may be the effect's own form."""
+    free = {
+        listed: {
+            f"remainder:{e}": p for e, p in wanders.items() if not any(meet(acts.get(u, ()), (e,)) for u in listed)
+        }
+        for listed in dict.fromkeys(listed_of)
+    }  # fmt: skip
+    return [
+        {r: p for r, p in free[listed].items() if r not in m.units}
+        for m, listed in zip(models, listed_of, strict=True)
+    ]  # fmt: skip
 
 
 def _or_left(models: Sequence[Model], weights: Iterable[float], form: str, equations: Sequence[str]) -> float:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 from functools import cache
+from math import inf, lgamma, log
 
 import numpy as np
-from scipy.special import gammaln
 
 from .model import LISTED, WORDS, Unit
 from .sets import OTHER_FORM
@@ -35,6 +35,7 @@ class SetPrior:
         kinds = [u.kind for u in units]
         self.counts = sum(k in LISTED for k in kinds), len(WORDS), kinds.count("remainder")
         self.of_controller = {u.id for u in units if u.of_controller}
+        self.among = {u.id: log(u.among) for u in units}
 
     def log_of(self, members: Sequence[tuple[str, int]]) -> float:
         """Prior of a set by how many of each kind it holds, spread evenly over the sets of its size.
@@ -48,14 +49,14 @@ class SetPrior:
         n_listed, n_forms, n_left = self.counts
         own = [u for u, v in members if v >= OTHER_FORM]
         if listed >= len(self.sizes):
-            return -np.inf
-        value = np.log(self.sizes[listed]) - _log_choose(n_listed, listed)
-        value += np.log(1.0 - ONE_MORE_FORM) + forms * np.log(ONE_MORE_FORM / n_forms) + gammaln(forms + 1)
-        value -= sum(np.log(self.units[u].among) for u, _ in members)
-        value += sum(np.log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
-        value += (listed + forms - len(own)) * np.log(1.0 - OTHER_FORM_PRIOR)
+            return -inf
+        value = log(self.sizes[listed]) - _log_choose(n_listed, listed)
+        value += log(1.0 - ONE_MORE_FORM) + forms * log(ONE_MORE_FORM / n_forms) + lgamma(forms + 1)
+        value -= sum(self.among[u] for u, _ in members)
+        value += sum(log(OTHER_FORM_PRIOR / self.shapes[u]) for u in own)
+        value += (listed + forms - len(own)) * log(1.0 - OTHER_FORM_PRIOR)
         left, n_left = left + controls, n_left + len(self.of_controller)
-        return value + left * np.log(REMAINDER_PRIOR) + (n_left - left) * np.log(1.0 - REMAINDER_PRIOR)
+        return value + left * log(REMAINDER_PRIOR) + (n_left - left) * log(1.0 - REMAINDER_PRIOR)
 
 
 @cache

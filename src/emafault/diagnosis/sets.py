@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class Model:
     deviations: dict[str, float] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def units(self) -> tuple[str, ...]:
         """Ids, sorted."""
         return tuple(sorted(c.unit for c in self.choices))
