@@ -30,6 +30,30 @@ def test_one_more_is_the_whole_set(inside, more):
         assert deviation == pytest.approx(expected[2], rel=1e-7)
 
 
+def test_a_set_grown_twice_is_the_whole_set():
+    """Grown by large members and then by small ones, it may be grown once more as if it had been factored anew."""
+    rng = np.random.default_rng(7)
+    count = 70
+    X = rng.standard_normal((2 * count, count)) * 10.0 ** rng.uniform(-2.0, 2.0, count)
+    fixed = rng.standard_normal(count) * 0.1
+    r = Reduced([str(k) for k in range(count)], X.T @ X, X.T @ rng.standard_normal(2 * count), -3.0, fixed)
+    free, mean = rng.permutation(count)[:60], rng.standard_normal(60) * 0.2
+    sd, signs = 10.0 ** rng.uniform(-2.0, 2.0, 60), rng.integers(-1, 2, 60)
+
+    def priors(k):
+        return mean[k], sd[k], signs[k]
+
+    a, b, c, d = slice(40), slice(40, 50), slice(50, 55), slice(55, 60)
+    grown = Factored(r, free[a], *priors(a)).with_more(free[b], *priors(b)).with_more(free[c], *priors(c))
+    anew = Factored(r, free[:55], *priors(slice(55)))
+    assert grown.value == pytest.approx(anew.value, rel=1e-12)
+    for found, expected in zip(
+        grown.and_one_more(free[d]).log_evidence(*priors(d)), anew.and_one_more(free[d]).log_evidence(*priors(d)),
+        strict=True,
+    ):  # fmt: skip
+        assert found == pytest.approx(expected, rel=1e-9)
+
+
 def test_columns_without_definite_sign_are_no_evidence():
     r = Reduced(["a", "b"], np.diag([1.0, -50.0]), np.zeros(2), 0.0, np.zeros(2))
     one = np.ones(1)

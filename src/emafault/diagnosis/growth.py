@@ -1,5 +1,7 @@
 """Evidence of a set with one member more, from the factor of the set: the Schur complement of what is added."""
 
+from copy import copy
+
 import numpy as np
 
 from ..compiled import compiled
@@ -21,11 +23,15 @@ class Factored:
         self.value, self.found, self.deviation, self.L, self.z = factored_set(
             r.M, r.b, r.constant, r.fixed, free, mean, sd
         )
-        at = r.fixed.copy()
-        at[free] = mean
+        self._at_means()
+
+    def _at_means(self) -> None:
+        """What further parameters need: the gradient at the priors' means, and the optimum in units of the priors."""
+        at = self.r.fixed.copy()
+        at[self.free] = self.mean
         on = np.flatnonzero(at)
-        self.gradient = r.b - r.M[:, on] @ at[on]
-        self.step, self.power = (self.found - mean) / sd, (self.deviation / sd) ** 2
+        self.gradient = self.r.b - self.r.M[:, on] @ at[on]
+        self.step, self.power = (self.found - self.mean) / self.sd, (self.deviation / self.sd) ** 2
 
     def log_evidence(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Value, indices, means and standard deviations of the set."""
@@ -33,6 +39,25 @@ class Factored:
             return -np.inf, self.free, self.mean, self.sd
         value = self.value + sided(self.r.fixed, self.free, self.signs, self.found, self.deviation)
         return value, self.free, self.found, self.deviation
+
+    def with_more(self, more: np.ndarray, mean: np.ndarray, sd: np.ndarray, signs: np.ndarray) -> "Factored":
+        """The set with further parameters, from the factor that there is: of the rest nothing is worked out again."""
+        out, one = copy(self), OneMore(self, more)
+        out.free, out.mean = np.concatenate([self.free, more]), np.concatenate([self.mean, mean])
+        out.sd, out.signs = np.concatenate([self.sd, sd]), np.concatenate([self.signs, signs])
+        away = mean - self.r.fixed[more]
+        gain, found, deviation, lower, z = _grown(
+            one.forward, one.back, one.left, self.z, self.step, self.power, one.gradient, away, sd
+        )  # fmt: skip
+        out.value = self.value + gain
+        out.found, out.deviation = out.mean + out.sd * found, out.sd * deviation
+        out.z = np.concatenate([self.z - one.forward.T @ away, z])
+        n, beside = len(self.free), sd[:, None] * one.forward
+        out.L = np.empty((n + len(more),) * 2)
+        out.L[:n, :n], out.L[n:, :n], out.L[:n, n:] = self.L, beside, beside.T
+        out.L[n:, n:] = np.tril(lower) + np.tril(lower, -1).T
+        out._at_means()
+        return out
 
     def and_one_more(self, more: np.ndarray) -> "OneMore":
         """The same with some further parameters free (indices), before it is said how wide their priors are."""
@@ -61,22 +86,22 @@ class OneMore:
 
 @compiled
 def _with_more(
-    value, forward, back, left, z, step, power, gradient, fixed, free, mean, sd, signs, more, its_mean, its_sd, its_signs
+    value, forward, back, left, z, step, power, gradient, fixed, free, mean, sd, signs, more, mean_of, sd_of, signs_of
 ):  # fmt: skip
     """Log evidence, indices, means and standard deviations of a set with further parameters."""
     both = np.concatenate((free, more))
-    means, sds = np.concatenate((mean, its_mean)), np.concatenate((sd, its_sd))
+    means, sds = np.concatenate((mean, mean_of)), np.concatenate((sd, sd_of))
     if not np.isfinite(value):
         return -np.inf, both, means, sds
-    gain, found, deviation = _grown(
-        forward, back, left, z, step, power, gradient, its_mean - fixed[more], its_sd
+    gain, found, deviation, _, _ = _grown(
+        forward, back, left, z, step, power, gradient, mean_of - fixed[more], sd_of
     )  # fmt: skip
     if not np.isfinite(gain):
         return -np.inf, both, means, sds
     for k in range(len(both)):
         found[k] = means[k] + sds[k] * found[k]
         deviation[k] *= sds[k]
-    sides = sided(fixed, both, np.concatenate((signs, its_signs)), found, deviation)
+    sides = sided(fixed, both, np.concatenate((signs, signs_of)), found, deviation)
     return value + gain + sides, both, found, deviation
 
 
@@ -111,7 +136,10 @@ def _complement(M, L, free, sd, more):
 @compiled
 def _grown(forward, back, left, z, step, power, gradient, away, sd):
     """What further parameters add to a set's log evidence; means and standard deviations of all, in units of their
-    priors. ``away``: the further priors' means from where these parameters are off."""
+    priors; the lower factor of what is added, and its inverse times the gradient at the priors' means.
+
+    ``away``: the further priors' means from where these parameters are off.
+    """
     e, n = forward.shape
     gain = 0.0
     here = np.empty(e)  # the gradient at the further priors' means, the set at its best
@@ -130,7 +158,7 @@ def _grown(forward, back, left, z, step, power, gradient, away, sd):
         S[k, k] += 1.0
     found, deviation = np.empty(n + e), np.empty(n + e)
     if not factored(S):
-        return -np.inf, found, deviation
+        return -np.inf, found, deviation, S, here
     more, found[n:], deviation[n:], inverse = optimum(S, here)
     gain += more
     rows = np.empty(e)
@@ -147,4 +175,4 @@ def _grown(forward, back, left, z, step, power, gradient, away, sd):
             wider += f * f
         found[k] = x
         deviation[k] = np.sqrt(wider)
-    return gain, found, deviation
+    return gain, found, deviation, S, here

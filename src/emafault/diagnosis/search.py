@@ -20,6 +20,7 @@ ADDED = 15  # units tried in addition to a set
 SWAPPED = 5  # units tried in the place of each member
 COMPLETED = 4  # leading sets that every candidate is added to in the end
 NEAR = 12.0  # log posterior within which a set is worth extending
+KEPT = 64  # sets that stay factored
 
 
 class Search:
@@ -40,7 +41,9 @@ class Search:
         self.units = {u.id: u for u in units}
         self.candidates = candidates
         self.seen: dict[tuple[tuple[str, int], ...], Model] = {}
-        self.last: tuple[tuple, Factored] | None = None
+        none = np.zeros(0)
+        self.nothing = Factored(reduced, none.astype(int), none, none, none.astype(int))
+        self.kept: dict[tuple, Factored] = {}  # sets that are factored, the last ones used
         self.usual: dict[tuple[str, int], float] = {}  # widths of the priors of what led before
         self.names = np.array(reduced.names, object)
         self.paid: dict[tuple[str, int], float] = {}
@@ -50,6 +53,7 @@ class Search:
         self.scanned = scanned
         self.prior = SetPrior(units, candidates, self.size_prior)
         flat = list(candidates.values())
+        self.columns = {m: len(c.index) + len(c.extra) for m, c in candidates.items()}
         self.flat = (
             np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
             _joined([x for c in flat for x in (c.index, c.extra)]).astype(int),
@@ -169,18 +173,20 @@ class Search:
         return max(1, len(self.units[unit].variants))
 
     def factored(self, members, width) -> Factored:
-        """A set ready for one member more; the last one is kept, for many are tried in addition to it."""
-        key = tuple((m, width[m]) for m in members)
-        if self.last is None or self.last[0] != key:
-            self.last = key, Factored(self.reduced, *self._free(members, width))
-        return self.last[1]
-
-    def _free(self, members, width) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """(column,) indices of a set's columns, their priors' means and standard deviations, and their sides."""
-        index = _joined([x for m in members for x in (self.candidates[m].index, self.candidates[m].extra)])
-        priors = [self._prior_of(m, width[m]) for m in members]
-        mean, sd, signs = (_joined([p[k] for p in priors]) for k in range(3))
-        return index.astype(int), mean, sd, signs.astype(int)
+        """A set ready for one member more. Its members come one after the other, those of most columns first, so that
+        sets that differ in small members share the factor of the large ones."""
+        ordered = sorted(members, key=lambda m: (-self.columns[m], m))
+        key = tuple((m, width[m]) for m in ordered)
+        begun = next((k for k in range(len(key), 0, -1) if key[:k] in self.kept), 0)
+        found = self.nothing if begun == 0 else self.kept.pop(key[:begun])
+        if begun:
+            self.kept[key[:begun]] = found
+        for k in range(begun, len(key)):
+            c, prior = self.candidates[ordered[k]], self._prior_of(*key[k])
+            found = self.kept[key[: k + 1]] = found.with_more(_joined([c.index, c.extra]).astype(int), *prior)
+        while len(self.kept) > KEPT:
+            del self.kept[next(iter(self.kept))]
+        return found
 
     def _prior_of(self, m, width) -> tuple[np.ndarray, ...]:
         """(column,) means, standard deviations and sides of a member's prior that is so wide."""
