@@ -23,15 +23,10 @@ class Factored:
         self.value, self.found, self.deviation, self.L, self.z = factored_set(
             r.M, r.b, r.constant, r.fixed, free, mean, sd
         )
-        self._at_means()
-
-    def _at_means(self) -> None:
-        """What further parameters need: the gradient at the priors' means, and the optimum in units of the priors."""
-        at = self.r.fixed.copy()
-        at[self.free] = self.mean
-        on = np.flatnonzero(at)
-        self.gradient = self.r.b - self.r.M[:, on] @ at[on]
-        self.step, self.power = (self.found - self.mean) / self.sd, (self.deviation / self.sd) ** 2
+        at = r.fixed.copy()
+        at[free] = mean
+        self.gradient = _less(r.b, r.M, np.arange(len(at)), at)
+        self.step, self.power = (self.found - mean) / sd, (self.deviation / sd) ** 2
 
     def log_evidence(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Value, indices, means and standard deviations of the set."""
@@ -51,12 +46,13 @@ class Factored:
         )  # fmt: skip
         out.value = self.value + gain
         out.found, out.deviation = out.mean + out.sd * found, out.sd * deviation
+        out.step, out.power = found, deviation**2
+        out.gradient = _less(self.gradient, self.r.M, more, away)
         out.z = np.concatenate([self.z - one.forward.T @ away, z])
         n, beside = len(self.free), sd[:, None] * one.forward
         out.L = np.empty((n + len(more),) * 2)
         out.L[:n, :n], out.L[n:, :n], out.L[:n, n:] = self.L, beside, beside.T
         out.L[n:, n:] = np.tril(lower) + np.tril(lower, -1).T
-        out._at_means()
         return out
 
     def and_one_more(self, more: np.ndarray) -> "OneMore":
@@ -82,6 +78,12 @@ class OneMore:
             s.value, self.forward, self.back, self.left, s.z, s.step, s.power, self.gradient, s.r.fixed, s.free, s.mean,
             s.sd, s.signs, self.more, mean, sd, signs,
         )  # fmt: skip
+
+
+def _less(b: np.ndarray, M: np.ndarray, index: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """(column,) the gradient where some columns have moved by d."""
+    on = np.flatnonzero(d)
+    return b - d[on] @ M[index[on]] if len(on) else b
 
 
 @compiled

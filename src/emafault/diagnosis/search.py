@@ -309,7 +309,7 @@ def _gains(M, b, d, starts, index, mean, sd):
     left = b.copy()
     for o in np.flatnonzero(d):
         for k in range(len(left)):
-            left[k] -= M[k, o] * d[o]
+            left[k] -= M[o, k] * d[o]  # along a row of memory
     out = np.empty(len(starts) - 1)
     for c in range(len(out)):
         own = index[starts[c] : starts[c + 1]]
