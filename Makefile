@@ -1,6 +1,7 @@
 # make study   runs the default study (experiment=NAME and overrides="..." choose another)
 # make test    runs the tests
-# Both set everything up in .venv first, which needs Python 3.11 and git.
+# make test-long  runs the longest ones, which repeat at other faults what quicker tests show
+# Each sets everything up in .venv first, which needs Python 3.11 and git.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= all
 experiment ?= paper
@@ -14,13 +15,16 @@ export MKL_NUM_THREADS := 1
 # pip installs without compiling, which is quicker; Python compiles a module when it is first imported, and keeps that
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: study test
+.PHONY: study test test-long
 
 study: .venv/ready
 	snakemake --cores $(CORES) --config experiment=$(experiment) "overrides=$(overrides)"
 
 test: .venv/ready
 	python -m pytest -n logical --maxprocesses 4
+
+test-long: .venv/ready
+	python -m pytest -n logical --maxprocesses 4 --dist load -m long
 
 .venv/ready: requirements.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, PYTHON=... names one") if sys.version_info < (3, 11) else None'

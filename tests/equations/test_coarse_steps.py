@@ -12,7 +12,9 @@ COARSE = {
 }
 
 
-@pytest.mark.parametrize("case", COARSE)
+@pytest.mark.parametrize(
+    "case", [c if c.startswith("currents") else pytest.param(c, marks=pytest.mark.long) for c in COARSE]
+)
 def test_coarse_steps_are_told_and_nothing_for_them(case):
     steps, effects, equation = COARSE[case]
     few = all_but("cogging", "stribeck", "magnet_temperature", "self_heating", "backlash")

@@ -52,6 +52,7 @@ def test_recordings_that_do_not_show_an_effect_say_nothing_of_it():
     assert log_odds_of_change(bench, fit, model, "load_spring") == pytest.approx(PRIOR, abs=2.0)
 
 
+@pytest.mark.long
 def test_what_changes_is_not_named_but_told():
     recordings = bench_of([60.0, -60.0, 20.0, -40.0])
     names = list(recordings)[1:]

@@ -144,6 +144,7 @@ def beside_cogging(entries):
     return diagnose("bench", recordings, (list(recordings), ()), ACTUATOR, NOISE, others).verdict
 
 
+@pytest.mark.long
 def test_all_waves_of_a_bearing_are_described():
     """A scan proposes one of them; while a set is full of what scans propose, another scan may find the next."""
     waves = [(3.57, 0.004), (7.14, 0.003), (10.71, 0.002)]

@@ -26,6 +26,7 @@ def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     assert verdict["verdict"] == "partly"
 
 
+@pytest.mark.long
 def test_smoothed_currents_are_told_and_undone():
     """A logger's exponential smoothing looks like a lag near none, and as an inductance that is another."""
     true, smooth = bench(COGGING), {}
@@ -45,6 +46,7 @@ def test_smoothed_currents_are_told_and_undone():
         assert np.std(off) < 0.1 * np.std(smooth[name].phase_current - true[name].phase_current)
 
 
+@pytest.mark.long
 def test_a_bent_curve_of_the_voltages_is_told_and_undone(tmp_path):
     true = {f"r{n}.nc": recorded("step", seed=n, theta_0=n) for n in range(4)}
     faulty = {
@@ -117,6 +119,7 @@ def test_a_gain_that_differs_between_recordings_is_told_and_undone(tmp_path):
         assert _off(undone, true, variable) < 0.4 * _off(changed, true, variable)
 
 
+@pytest.mark.long
 def test_faults_that_grow_hum_and_scale_are_told_and_undone():
     """A gain of the currents that drifts had been told as a torque constant that builds up, a hum of all voltages as
     waves of two phases beside a remainder, a scale of the output as a delay of the controller."""
@@ -201,6 +204,7 @@ def _off(recordings, true, variable):
     return np.sqrt(np.mean([np.mean(x**2) for x in parts]))
 
 
+@pytest.mark.long
 def test_voltages_of_duty_cycles_are_told_and_the_drop_undone(tmp_path):
     true = bench(COGGING)
     of_duty = {

@@ -130,6 +130,7 @@ def three(tmp_path_factory):
     return out
 
 
+@pytest.mark.long
 def test_what_was_checked_on_the_reference_actuator_holds_on_three(three):
     assert [name.rpartition("_")[2] for name in three] == ["28v", "48v", "270v"]
     every = [row for rows in three.values() for row in rows]
