@@ -116,7 +116,10 @@ def test_a_position_gain_changes_no_plant_effect(cogging):
 
 @pytest.mark.parametrize(
     ("form", "parameter", "size"),
-    [("command_filter", "filter", {"time_constant": 0.004}), ("feedforward", "feedforward", {"gain": 0.5})],
+    [
+        ("command_filter", "filter", {"time_constant": 0.004}),
+        pytest.param("feedforward", "feedforward", {"gain": 0.5}, marks=pytest.mark.long),
+    ],
 )
 def test_what_a_controller_does_with_its_command_is_told_and_no_gap_of_the_machine(form, parameter, size):
     """Without forms of their own a filter had been told as a delay, and both as another position gain."""

@@ -97,6 +97,7 @@ def test_currents_that_lag_are_told():
     assert told["form"] == "lag" and next(iter(told["parameters"].values()))["value"] == pytest.approx(0.7, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_gain_that_differs_between_recordings_is_told_and_undone(tmp_path):
     """It had been told as a magnet's temperature."""
     true = bench(COGGING)
@@ -166,6 +167,7 @@ def test_an_offset_that_warms_up_is_told_and_undone():
     assert _off(undone, true, "phase_current") < 0.05 * _off(faulty, true, "phase_current")
 
 
+@pytest.mark.long
 def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder():
     verdict = verdict_of(bench(COGGING, replace(ACTUATOR, gear_ratio=ACTUATOR.gear_ratio / 1.003)))
     assert verdict["which"][0]["effects"] == ["cogging"]
@@ -174,6 +176,7 @@ def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder()
     assert "the controller sees it so" in told["sentence"]
 
 
+@pytest.mark.long
 def test_faults_of_three_channels_at_once_are_told_and_undone(tmp_path):
     """An offset of one current that is another in each recording, crosstalk of the voltages, an offset of the speed."""
     true, faulty = bench(COGGING), {}
@@ -248,6 +251,7 @@ def test_spikes_are_left_out_and_told(cogging):
     assert amplitude["value"] == pytest.approx(same["value"], abs=0.2 * (same["high"] - same["low"]))
 
 
+@pytest.mark.long
 def test_spikes_of_the_motion_are_told_and_replaced(tmp_path):
     """The control law sums what it sees, the torque takes second differences: three samples had been wrong names."""
     true, spiked = bench(COGGING), {}
