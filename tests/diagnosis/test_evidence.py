@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
+from scipy.special import log_ndtr
 
-from emafault.diagnosis.evidence import Normal, log_evidence, marginalise
+from emafault.diagnosis.evidence import ASYMPTOTIC, Normal, log_evidence, marginalise, sided
 from emafault.diagnosis.whitening import coloured, filtered, whiten
 
 
@@ -89,3 +90,12 @@ def test_a_hole_in_the_spectrum_is_not_believed():
     keep = np.ones(len(x), bool)
     bias = filtered(np.ones((len(x), 1)), coloured(x, keep))[100:, 0]
     assert np.sqrt(np.mean(bias**2)) < 1.2  # a constant offset counts no more than with white noise of unit variance
+
+
+@pytest.mark.parametrize("at", [-500.0, -60.0, ASYMPTOTIC - 1e-6, ASYMPTOTIC + 1e-6, -3.0, -1e-9, 0.0, 2.0, 9.0])
+def test_a_prior_on_one_side_counts_the_posterior_s_mass_there(at):
+    """Beside a parameter that may have either sign."""
+    free, signs = np.array([0, 1]), np.array([-1, 0])
+    found, deviation = np.array([0.3 - 0.5 * at, 1.0]), np.array([0.5, 1.0])
+    expected = np.log(2.0) + log_ndtr(at)
+    assert sided(np.array([0.3, 0.0]), free, signs, found, deviation) == pytest.approx(expected, rel=1e-12, abs=1e-14)

@@ -53,10 +53,11 @@ class Search:
         self.scanned = scanned
         self.prior = SetPrior(units, candidates, self.size_prior)
         flat = list(candidates.values())
-        self.columns = {m: len(c.index) + len(c.extra) for m, c in candidates.items()}
+        #: (column,) indices of each candidate's own columns and of its own form's
+        self.columns = {m: np.concatenate([c.index, c.extra]).astype(int) for m, c in candidates.items()}
         self.flat = (
-            np.cumsum([0, *(len(c.index) + len(c.extra) for c in flat)]),
-            _joined([x for c in flat for x in (c.index, c.extra)]).astype(int),
+            np.cumsum([0, *map(len, self.columns.values())]),
+            _joined(list(self.columns.values())).astype(int),
             _joined([x for c in flat for x in (c.mean, np.zeros(len(c.extra)))]),
             _joined([x for c in flat for x in (c.sd, c.extra_sd)]),
         )  # fmt: skip
@@ -128,7 +129,7 @@ class Search:
         """Evidence at the best width of one member's prior: uphill over its grid from where it is."""
         c = self.candidates[m]
         others = self.factored(tuple(o for o in members if o != m), width)
-        more = others.and_one_more(_joined([c.index, c.extra]).astype(int))
+        more = others.and_one_more(self.columns[m])
 
         def evidence(w):
             return more.log_evidence(*self._prior_of(m, w))
@@ -175,15 +176,15 @@ class Search:
     def factored(self, members, width) -> Factored:
         """A set ready for one member more. Its members come one after the other, those of most columns first, so that
         sets that differ in small members share the factor of the large ones."""
-        ordered = sorted(members, key=lambda m: (-self.columns[m], m))
+        ordered = sorted(members, key=lambda m: (-len(self.columns[m]), m))
         key = tuple((m, width[m]) for m in ordered)
         begun = next((k for k in range(len(key), 0, -1) if key[:k] in self.kept), 0)
-        found = self.nothing if begun == 0 else self.kept.pop(key[:begun])
-        if begun:
-            self.kept[key[:begun]] = found
+        found = self.nothing
+        if begun:  # put last again
+            found = self.kept[key[:begun]] = self.kept.pop(key[:begun])
         for k in range(begun, len(key)):
-            c, prior = self.candidates[ordered[k]], self._prior_of(*key[k])
-            found = self.kept[key[: k + 1]] = found.with_more(_joined([c.index, c.extra]).astype(int), *prior)
+            grown = found.with_more(self.columns[ordered[k]], *self._prior_of(*key[k]))
+            found = self.kept[key[: k + 1]] = grown
         while len(self.kept) > KEPT:
             del self.kept[next(iter(self.kept))]
         return found
