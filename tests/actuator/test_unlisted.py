@@ -5,7 +5,7 @@ import pytest
 
 from emafault.actuator.commands import command_positions, seen_by_controller
 from emafault.actuator.fixed_step import simulate_fixed_step
-from emafault.actuator.parameters import make_runs
+from emafault.actuator.parameters import make_runs, with_shape
 from emafault.actuator.simulate import simulate
 from emafault.actuator.unlisted import COORDINATES, PLACES, SHAPES, acting, remembered, term
 from emafault.config import reference_actuator
@@ -173,6 +173,20 @@ def test_both_simulations_agree(nominal, place, shape, parameters):
 
     assert apart(ours, theirs) < 4e-3
     assert apart(ours, nominal) > 3.0 * apart(ours, theirs)
+
+
+@pytest.mark.parametrize("form", [(), ("back_emf_shape",)], ids=["closed", "tabulated"])
+def test_both_simulations_agree_on_a_back_emf_with_harmonics(nominal, form):
+    runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
+    shaped = with_shape(runs, [{"place": "emf", "form": "harmonics", "h3": 0.3, "h11": -0.1}])
+    assert not runs["emf_harmonics"].any()
+    ours = stretches(simulate(shaped, TO_AND_FRO, 0.3, 2e-4))
+    theirs = stretches(simulate_fixed_step(shaped, TO_AND_FRO, 0.3, 2e-4, 2e-6, forms=form))
+
+    def apart(one, other):
+        return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
+
+    assert apart(ours, theirs) < (1e-2 if form else 4e-3) < 0.3 * apart(ours, nominal)
 
 
 TOGETHER = np.array(

@@ -191,6 +191,11 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"gain_voltage.c@one.nc": 0.01},
             {"place": "voltage_c", "form": "gain", "gain": 0.01, "recordings": {"one.nc": {"gain": 0.01}}},
         ),
+        (
+            "~harmonics_emf",
+            {"emf.h3": -0.02, "emf.h11": 0.004},
+            {"place": "emf", "form": "harmonics", "h3": -0.02, "h11": 0.004},
+        ),
         ("~scale_output", {"gain_output.recorder": 0.01}, {"place": "output", "form": "gain", "gain": 0.01}),
         (
             "~gain_current",

@@ -4,6 +4,7 @@ import hashlib
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import yaml
 
@@ -74,6 +75,24 @@ def test_what_a_unit_is_beyond_its_tolerance_and_the_library_does_not_list_is_to
     text = experiment_text(verdict, verdict["simulator"]["after"], "again")
     assert "not simulated" not in text
     assert yaml.safe_load(text)["effects"]["inertia"]["scale"] == pytest.approx(1.25, abs=0.02)
+
+
+@pytest.mark.long
+def test_a_shape_of_the_back_emf_that_the_library_lacks_is_told_by_its_harmonics_and_simulated():
+    """Phase by phase, and along the angle alone, it had been waves of one phase, a gain that drifts and remainders."""
+    recordings = bench({"back_emf_shape": {"width": 118.0, "h5": 0.01}})
+    names = list(recordings)
+    exclude = all_but("cogging", "virtual_neutral", "voltage_gain", "unit_calibration")
+    verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, exclude).verdict
+    assert verdict["verdict"] == "described" and verdict["which"][0]["effects"] == []
+    told = next(d for d in verdict["discovered"] if d["unit"] == "~harmonics_emf")
+    assert (told["equation"], told["form"], told["along"]) == ("electrical", "coefficient", "rotor_angle")
+    assert verdict["shrinks"]["signal"]["closed"] > 0.95
+    x = np.linspace(0.0, 0.5 * np.pi, 2001)
+    added = np.minimum(1.0, x / np.deg2rad(31.0)) - np.minimum(1.0, x / np.deg2rad(30.0)) + 0.01 * np.sin(5.0 * x)
+    for name in ("h3", "h5", "h7", "h9"):
+        wanted = 2.0 * np.mean(added * np.sin(int(name[1:]) * x))
+        assert told["term"][name] == pytest.approx(wanted, abs=0.3 * abs(wanted) + 1e-3), name
 
 
 def test_what_the_fit_can_only_have_far_beyond_its_prior_is_no_absence_of_a_gap(monkeypatch):

@@ -27,6 +27,14 @@ def test_a_prior_on_one_side_of_off_has_the_whole_range_of_the_catalogue(nominal
                     assert min(sign * x for x in side) >= 0.0, p.name
 
 
+@pytest.mark.parametrize(("lacking", "there"), [((), False), (("back_emf_shape",), True), (("cogging",), False)])
+def test_the_back_emf_has_harmonics_of_its_own_where_no_effect_is_another_shape(lacking, there):
+    machine = machine_of({"a.nc": recorded()}, lacking)
+    assert ("~harmonics_emf" in {u.id for u in machine.units}) is there
+    columns = next(b for b in machine.blocks({n: p.off for n, p in machine.parameters.items()}, "a.nc")).columns
+    assert ("emf.h13" in columns) is there
+
+
 def test_the_form_of_an_effect_may_differ_along_every_coordinate(nominal):
     """Each function of an own form is the constant or goes along one coordinate, the temperature beside time."""
     name, rec = next(iter(nominal.recordings.items()))

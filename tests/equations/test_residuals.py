@@ -147,6 +147,20 @@ def test_the_controller_does_not_see_what_a_recorder_makes_of_a_signal(fault):
     assert mean_squares(machine, truth(machine, recording) | values)["control"] < 1.3
 
 
+@pytest.mark.parametrize("command", ["reversal", "sine"])
+def test_white_with_a_back_emf_that_has_harmonics(command):
+    sizes = {"h3": 0.03, "h5": -0.02, "h13": 0.01}
+    entry = {"place": "emf", "form": "harmonics", **sizes}
+    recording = recorded(command, unlisted=(entry,), fault=FAULT, health="seeded")
+    machine = machine_of({"a.nc": recording})
+    without = truth(machine, recording, fault=FAULT)
+    before, after = (
+        mean_squares(machine, without | more) for more in ({}, {f"emf.{name}": x for name, x in sizes.items()})
+    )
+    for equation in ("electrical_a", "electrical_b", "electrical_c", "torque"):
+        assert 0.75 < after[equation] < 1.2 and before[equation] > 1.3, equation
+
+
 def test_the_controller_sees_the_speed_as_its_sensor_makes_it():
     recording = recorded("reversal", effects={"speed_latency": {"tau": 2e-3}})
     machine = machine_of({"a.nc": recording})

@@ -35,6 +35,18 @@ def test_what_is_the_machines_stays_there(change, equation, form):
     assert (said["equation"], said["form"]) == (equation, form)
 
 
+def test_the_shape_of_the_back_emf_is_told_by_its_harmonics():
+    said = told_of_chain(
+        "~harmonics_emf", "electrical", {"emf.h3": (-0.02, 1e-3), "emf.h11": (0.004, 1e-3)},
+        {"emf.h3": "1", "emf.h11": "1"}, ACTUATOR,
+    )  # fmt: skip
+    assert (said["equation"], said["form"], said["along"]) == ("electrical", "coefficient", "rotor_angle")
+    assert said["sentence"] == (
+        "In the electrical equation: the back-EMF of all phases has harmonics beside its trapezoid, "
+        "-2 % of order 3 and 0.4 % of order 11."
+    )
+
+
 def test_a_drag_that_builds_up_over_travel_is_a_memory_along_the_angle():
     form = Described("~t", "travel", "torque", 0, (("length", 4.2, 0.1, "rad"),), 0.1, 1.0)
     said = telling.told(form, {"amplitude": (0.018, 1e-4)}, ACTUATOR)

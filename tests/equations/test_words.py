@@ -34,6 +34,7 @@ def test_every_form_has_words():
 
 
 def test_what_stands_on_the_page():
+    assert words.of_number("emf.h3") == "harmonic of the back-EMF of order 3"
     assert words.of_number("seeded.Na") == "shorted turns of phase a, share of all, in all seeded recordings"
     assert words.of_number("controller.passing_b_back_in@x.nc") == (
         "commutation time, deviation of phase b: backward, flowing into it, x"

@@ -13,6 +13,7 @@ from .forms import (
     F_SHAPE,
     F_UNIT,
 )
+from .grammar import ORDERS
 from .unlisted import AT_EMF, AT_RESISTANCE
 
 TABLE = 720  # entries of the back-EMF table per electrical turn
@@ -28,6 +29,7 @@ def back_emf_table(record: np.void) -> np.ndarray:
     half = round(6 * TABLE / 360)
     shape = np.mean([np.roll(shape, s) for s in range(-half, half + 1)], axis=0)
     h5, h7 = record["back_emf_shape_h5"], record["back_emf_shape_h7"]
+    shape += sum(size * np.sin(n * x) for n, size in zip(ORDERS, record["emf_harmonics"], strict=True))
     return shape + h5 * np.sin(5 * x) + h7 * np.sin(7 * x) + 0.3 * h5 * np.sin(11 * x)
 
 
@@ -46,6 +48,9 @@ def shape(x, record, table, tabulated):
         f = -f
     if record.back_emf_shape_h5 != 0.0 or record.back_emf_shape_h7 != 0.0:
         f += record.back_emf_shape_h5 * np.sin(5.0 * x) + record.back_emf_shape_h7 * np.sin(7.0 * x)
+    for m in range(len(ORDERS)):
+        if record.emf_harmonics[m] != 0.0:
+            f += record.emf_harmonics[m] * np.sin(ORDERS[m] * x)
     return f
 
 

@@ -16,6 +16,8 @@ MACHINE = {
     "torque": "N m", **{f"emf_{j}": "1" for j in PHASES}, **{f"resistance_{j}": "ohm" for j in PHASES}, "drag": "N m",
     "torque_constant": "1", "inertia": "1",
 }  # fmt: skip
+#: the shape of the back-EMF of all phases, each along its own electrical angle -> unit of what a form adds to it
+SHAPE = {"emf": "1"}
 #: channel of the measuring chain -> its unit; without a phase, that of all three
 CHANNELS = {
     "voltage": "V", **{f"voltage_{j}": "V" for j in PHASES}, "current": "A", **{f"current_{j}": "A" for j in PHASES},
@@ -29,7 +31,7 @@ FACTORS = {
 }  # fmt: skip
 #: what a controller may do with its command before it compares it -> unit
 CONTROLLER = {"command": "1"}
-PLACES = MACHINE | CHANNELS | FACTORS | CONTROLLER
+PLACES = MACHINE | SHAPE | CHANNELS | FACTORS | CONTROLLER
 #: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
 #: of the magnitudes), the angle turned since the start over the gear ratio, time, the initial winding temperature
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
@@ -67,10 +69,16 @@ OF_CHANNELS = {
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
 OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
-FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER
+#: orders, per electrical turn, of what the shape of the back-EMF may have beside its trapezoid: sin(n x) each, which
+#: is all that a shape has whose halves mirror one another
+ORDERS = (3, 5, 7, 9, 11, 13)
+OF_SHAPE = {"harmonics": tuple(f"h{n}" for n in ORDERS)}
+FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER | OF_SHAPE
 #: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing, a
-#: gain that stays
-OPTIONAL = {"frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",)}
+#: gain that stays, a harmonic that is not there
+OPTIONAL = {
+    "frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",), "harmonics": OF_SHAPE["harmonics"],
+}  # fmt: skip
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
 EACH = "recordings"
 
@@ -79,6 +87,8 @@ def forms_at(place: str) -> list[str]:
     """Forms that a place may have."""
     if place in CONTROLLER:
         return list(OF_CONTROLLER)
+    if place in SHAPE:
+        return list(OF_SHAPE)
     shapes = [form for form in SHAPES if form != "travel" or place == "torque"]
     if place not in CHANNELS:
         return shapes

@@ -7,6 +7,7 @@ change; the simulation only has to notice when the rotor passes from one cell to
 import numpy as np
 
 from ..compiled import compiled
+from .grammar import ORDERS
 
 TWO_PI = 2.0 * np.pi
 AXIS = np.array([0.0, TWO_PI / 3.0, 2.0 * TWO_PI / 3.0])  # alpha_j, electrical rad
@@ -77,6 +78,14 @@ def modulate(p, theta, j, f, df):
         f += fifth + seventh
         df += p.pole_pairs * slope
         ddf = -p.pole_pairs * p.pole_pairs * (25.0 * fifth + 49.0 * seventh)
+    if has_more_harmonics(p):
+        x = p.pole_pairs * theta - AXIS[j]
+        for m in range(len(ORDERS)):
+            n, size = ORDERS[m], p.emf_harmonics[m]
+            wave = size * np.sin(n * x)
+            f += wave
+            df += p.pole_pairs * n * size * np.cos(n * x)
+            ddf -= (p.pole_pairs * n) ** 2 * wave
     g, dg, ddg = angle_modulation(p, theta, j)
     return f * g, df * g + f * dg, ddf * g + 2.0 * df * dg + f * ddg
 
@@ -86,7 +95,13 @@ def is_modulated(p):
     """Whether k_j depends on the angle by more than the trapezoid."""
     eccentric = p.eccentricity_law > 0 and (p.eccentricity[0] != 0.0 or p.eccentricity[1] != 0.0)
     harmonic = p.back_emf_shape_h5 != 0.0 or p.back_emf_shape_h7 != 0.0
-    return eccentric or harmonic or p.dynamic_eccentricity_d != 0.0
+    return eccentric or harmonic or has_more_harmonics(p) or p.dynamic_eccentricity_d != 0.0
+
+
+@compiled
+def has_more_harmonics(p):
+    """Whether the shape of the back-EMF has harmonics that no catalogue lists."""
+    return np.any(p.emf_harmonics != 0.0)
 
 
 @compiled

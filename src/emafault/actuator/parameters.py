@@ -4,7 +4,7 @@ A run is a record of a NumPy structured array, so that thousands of runs are one
 fields by name. The field of parameter ``a`` of effect ``stribeck`` is ``stribeck_a``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..errors import InputError
 from ..nominal import ActuatorParameters
+from .grammar import OF_SHAPE, ORDERS, SHAPE, of_recording
 
 ECCENTRICITY_LAWS = ("stator_fixed", "rotor_angle", "rotor_angle_per_phase")
 
@@ -25,6 +26,7 @@ _CONDITIONS = (
     ("dT_magnet", np.float64),  # magnets, K above the reference temperature
     ("eccentricity_law", np.int64),
     ("theta_0", np.float64),  # rotor angle at the start, rad
+    ("emf_harmonics", np.float64, (len(ORDERS),)),  # of the back-EMF's shape, by order, beside those of an effect
 )
 
 RUN_DTYPE = np.dtype(
@@ -101,3 +103,14 @@ def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, Any]]) -> N
                 accepted = ", ".join(effect.parameters)
                 raise InputError(f"effects.{effect_id}: '{name}' is not known, accepted are {accepted}")
             runs[effect.field(name)] = value
+
+
+def with_shape(runs: np.ndarray, entries: Sequence[Mapping[str, Any]], recording: str = "") -> np.ndarray:
+    """(run,) records whose back-EMF has the harmonics of the entries of ``unlisted`` that are of its shape; of a
+    recording that is replayed, by its name."""
+    mine = [of_recording(e, recording) for e in entries if e["place"] in SHAPE]
+    if not mine:
+        return runs
+    out = runs.copy()
+    out["emf_harmonics"] += [sum(e.get(name, 0.0) for e in mine) for name in OF_SHAPE["harmonics"]]
+    return out

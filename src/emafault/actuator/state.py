@@ -5,8 +5,8 @@ import numpy as np
 from ..compiled import compiled
 from .conduction import NEVER
 from .friction import coulomb_torque, static_limit
-from .grammar import MOST_TERMS
-from .motor import MAX_CELLS, TWO_PI, build_cells, is_modulated, modulate, phase_constants
+from .grammar import MOST_TERMS, ORDERS
+from .motor import MAX_CELLS, TWO_PI, build_cells, has_more_harmonics, is_modulated, modulate, phase_constants
 from .unlisted import (
     AT_EMF,
     AT_INERTIA,
@@ -96,6 +96,8 @@ def begin(p, s, row):
     s.fastest = 0.0
     if s.modulated:
         s.fastest = 7.0 * p.pole_pairs if p.back_emf_shape_h5 != 0.0 or p.back_emf_shape_h7 != 0.0 else 1.0
+        if has_more_harmonics(p):
+            s.fastest = ORDERS[-1] * p.pole_pairs
     if p.cogging_a != 0.0:
         s.fastest = max(s.fastest, 0.5 * COGGING_ORDER)  # a small part of the torque
     s.heated, s.compliant = p.self_heating_heating_rate > 0.0, p.compliance_K > 0.0

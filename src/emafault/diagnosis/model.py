@@ -14,7 +14,7 @@ TOLERANCES = 4.0  # within which a unit's own values lie: its parameters' prior 
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
     "lag", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "pulse", "function",
-    "power", "memory", "travel",
+    "power", "memory", "travel", "harmonics",
 )  # fmt: skip
 
 

@@ -107,6 +107,8 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
     if kind == "drop":
         ((place, drop),) = ((n, v) for n, v in values.items() if n != "turn")
         return _rounded({"place": place, "form": "drop", "drop": drop, "turn": values["turn"]})
+    if kind == "harmonics":
+        return _rounded({"place": channel, "form": kind, **values})
     if kind == "controller":
         ((_, amount),) = values.items()
         return _rounded({"place": "command", **CONTROLLER[channel](amount)})

@@ -9,12 +9,13 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
 from ..effects.scaling import scaled
-from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque
+from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque, waveform
 from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
 from .parameters import beyond_tolerance, controller, internal, measuring_chain, nuisances, unit_of
-from .point import Point, State
+from .point import Point, State, effect_name
 from .signals import Signals
+from .terms import with_hook
 
 #: channels whose faults show in an equation, as what one of its drivers multiplies: a wave of the recorded angle is
 #: also one of its rate, times the speed
@@ -71,6 +72,9 @@ class ReferenceActuator:
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
         self.units += [*measuring_chain(actuator, self.recordings, self.reference, exclude), *controller(actuator)]
+        # an effect that is another shape takes a form of its own
+        if not any(effect_name(m) in self.effects for m in with_hook("harmonics")):
+            self.units.append(waveform.unit())
         lacking = [e for e in self.catalogue.values() if e.id in exclude]
         self.units += beyond_tolerance(lacking, actuator, self.parameters)
         for unit in self.units:

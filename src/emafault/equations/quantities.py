@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..actuator.shape import trapezoid_at, trapezoid_swept
+from . import waveform
 from .acquisition import currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
@@ -81,7 +82,7 @@ def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> D
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
         total = total + m.harmonics(state.p.of(effect_name(m)), low - off, high - off)
-    return total
+    return total + waveform.swept(state.p, low - off, high - off)
 
 
 def _before(x: np.ndarray) -> np.ndarray:

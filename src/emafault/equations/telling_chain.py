@@ -1,5 +1,5 @@
-"""Faults of the measuring chain that have parameters of their own, and what a controller does with its command, in
-words: one function a kind."""
+"""Faults of the measuring chain that have parameters of their own, what a controller does with its command and the
+shape of the back-EMF, in words: one function a kind."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -119,6 +119,13 @@ def _controller(fault: Fault) -> Told:
     return Told(CONTROLLER[fault.channel].format(amount), "controller", where="In the control equation")
 
 
+def _harmonics(fault: Fault) -> Told:
+    sizes = [f"{100.0 * v:.2g} % of order {n.rpartition('.h')[2]}" for n, v in fault.values.items()]
+    listed = ", ".join(sizes[:-1]) + " and " * (len(sizes) > 1) + sizes[-1]
+    says = f"the back-EMF of all phases has harmonics beside its trapezoid, {listed}"
+    return Told(says, "coefficient", "rotor_angle", "In the electrical equation")
+
+
 def _ambient(fault: Fault) -> Told:
     above = fault.values.values()
     ends = f"{min(above):z.2g} to {max(above):z.2g} K above the recorded ambient temperature"
@@ -178,6 +185,6 @@ def _lag(fault: Fault) -> Told:
 
 KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift, "gain": _gain,
-    "scale": _scale,
+    "scale": _scale, "harmonics": _harmonics,
     "ambient": _ambient, "controller": _controller,
 }  # fmt: skip

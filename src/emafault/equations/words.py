@@ -106,6 +106,8 @@ def _of_group(group: str, short: str) -> str:
         return CONTROLLER.get(short, short)
     if group == "command":
         return {"filter": "filter of the command", "feedforward": "feed-forward of the command's speed"}[short]
+    if group == "emf":
+        return f"harmonic of the back-EMF of order {short.removeprefix('h')}"
     channel, _, side = short.partition("_")
     late = short.rpartition("_")[0]
     chain = {
