@@ -1,12 +1,13 @@
 """A fleet of many small benches, diagnosed for real by the workflow.
 
-    python benchmarks/fleet.py [--benches 1000] [--cores 2]
+    python benchmarks/fleet.py [--benches 1000] [--cores 2] [--folder DIR]
 
 Units within their tolerances are recorded at five dates, two recordings of 0.4 s each time. From a date on a third of
 them has an effect of the catalogue at the upper half of its range. The table is compared with what was put in.
 """
 
 import argparse
+import contextlib
 import resource
 import subprocess
 import tempfile
@@ -55,10 +56,13 @@ def make(folder: Path, benches: int) -> dict[str, str]:
             if name not in truth and len(truth) == benches:
                 return truth
             truth[name] = effect if on else ""
+            path = folder / name / f"{command}.nc"
+            if path.exists():
+                continue
             spec = composed[command, on] | {"seed": 100 * unit + n, "unit_seed": unit + 1}
             recording = simulate_recording(spec, np.array([0, 0, 0, 0, 0, AMBIENT[n % 2] - 20.0]))
             attributes = recording.attributes | {"unit": f"unit{unit:03d}", "recorded": date}
-            write_recording(folder / name / f"{command}.nc", replace(recording, attributes=attributes))
+            write_recording(path, replace(recording, attributes=attributes))
     return truth
 
 
@@ -68,9 +72,12 @@ def main() -> None:
     parser.add_argument("--benches", type=int, default=1000)
     parser.add_argument("--cores", default="2")
     parser.add_argument("--page", type=Path, help="where the fleet's page is kept")
+    parser.add_argument("--folder", type=Path, help="where all is kept; a run that was cut off goes on there")
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        house, folder = build(Path(scratch) / "house"), Path(scratch) / "benches"
+    with contextlib.nullcontext(args.folder) if args.folder else tempfile.TemporaryDirectory() as scratch:
+        house, folder = Path(scratch).resolve() / "house", Path(scratch).resolve() / "benches"
+        if not house.exists():
+            build(house)
         truth = make(folder, args.benches)
         command = snakemake("fleet", "--config", f"benches={folder}", cores=args.cores)
         begun = time.monotonic()
@@ -79,7 +86,7 @@ def main() -> None:
         took, used = time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
         report(house / "results" / "fleets" / folder.name, truth)
         cpu = used.ru_utime + used.ru_stime
-        print(f"{len(truth)} benches in {took:.0f} s, {cpu:.0f} s of CPU ({cpu / len(truth):.1f} s a bench), ", end="")
+        print(f"{len(truth)} benches; this run took {took:.0f} s, {cpu:.0f} s of CPU, ", end="")
         print(f"{used.ru_maxrss / 1024.0:.0f} MB the largest process")
         if args.page:
             args.page.write_bytes((house / "results" / "fleets" / folder.name / "report.html").read_bytes())
