@@ -87,7 +87,7 @@ def of_form(
 
 
 def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | None:
-    """Entry of a fault of the measuring chain that has parameters of its own: lag, crosstalk, drift, curve, drop."""
+    """Entry of a unit that has parameters of its own: a lag, crosstalk, drift, curve or drop, the back-EMF's shape."""
     kind, _, channel = unit.removeprefix("~").partition("_")
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
