@@ -150,6 +150,11 @@ def stretches(signals):
     }
 
 
+def apart(one, other, nominal):
+    """Largest relative difference of two runs' stretches, by quantity, over the nominal run's root mean square."""
+    return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
+
+
 @pytest.fixture(scope="module")
 def nominal():
     runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
@@ -168,11 +173,8 @@ def test_both_simulations_agree(nominal, place, shape, parameters):
     ours = stretches(simulate(runs, TO_AND_FRO, 0.3, 2e-4, terms=rows, table=WANDER))
     theirs = stretches(simulate_fixed_step(runs, TO_AND_FRO, 0.3, 2e-4, 2e-6, terms=rows, table=WANDER))
 
-    def apart(one, other):
-        return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
-
-    assert apart(ours, theirs) < 4e-3
-    assert apart(ours, nominal) > 3.0 * apart(ours, theirs)
+    assert apart(ours, theirs, nominal) < 4e-3
+    assert apart(ours, nominal, nominal) > 3.0 * apart(ours, theirs, nominal)
 
 
 @pytest.mark.parametrize("form", [(), ("back_emf_shape",)], ids=["closed", "tabulated"])
@@ -183,10 +185,7 @@ def test_both_simulations_agree_on_a_back_emf_with_harmonics(nominal, form):
     ours = stretches(simulate(shaped, TO_AND_FRO, 0.3, 2e-4))
     theirs = stretches(simulate_fixed_step(shaped, TO_AND_FRO, 0.3, 2e-4, 2e-6, forms=form))
 
-    def apart(one, other):
-        return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
-
-    assert apart(ours, theirs) < (1e-2 if form else 4e-3) < 0.3 * apart(ours, nominal)
+    assert apart(ours, theirs, nominal) < (1e-2 if form else 4e-3) < 0.3 * apart(ours, nominal, nominal)
 
 
 TOGETHER = np.array(
@@ -205,10 +204,7 @@ def test_both_simulations_agree_beside_listed_effects(nominal, effect):
     plain, ours = (stretches(simulate(runs, TO_AND_FRO, 0.3, 2e-4, terms=t)) for t in (None, TOGETHER))
     theirs = stretches(simulate_fixed_step(runs, TO_AND_FRO, 0.3, 2e-4, 2e-6, terms=TOGETHER))
 
-    def apart(one, other):
-        return max(np.sqrt(np.mean((one[n] - other[n]) ** 2) / np.mean(nominal[n] ** 2)) for n in nominal)
-
-    assert apart(ours, theirs) < 4e-3 < 0.1 * apart(ours, plain)
+    assert apart(ours, theirs, nominal) < 4e-3 < 0.1 * apart(ours, plain, nominal)
 
 
 def test_every_shape_and_place_is_compared():
