@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from emafault.diagnosis.linear import White, assemble, compressed_columns, correct, own_columns
+from emafault.diagnosis.linear import OwnForm, White, assemble, compressed_columns, correct, function_of, own_columns
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.whitening import Weights, products
 
@@ -56,9 +56,18 @@ def test_a_form_is_seen_where_noise_averages_out():
     seen = {}
     for name, bands in {"white": [np.ones(ROWS)], "differenced": [np.ones(ROWS), np.full(ROWS - 1, -0.499)]}.items():
         block = Block("one", "torque", np.zeros(ROWS), {"load.T": slow}, bands, usable, along)
-        seen[name] = own_columns(block, "load", {"load.T": 0.9})[0]
+        seen[name] = own_columns(block, "load", OwnForm({"load.T": 0.9}))[0]
     assert seen["white"] == []
     assert seen["differenced"] == ["own.load.torque.0", "own.load.torque.1"]
+
+
+def test_what_a_form_has_by_parameters_of_its_own_needs_none_of_the_library_s():
+    columns = {"load.T": np.ones(ROWS), "load.wave": np.arange(ROWS)}
+    block = Block("one", "torque", np.zeros(ROWS), columns, [np.ones(ROWS)], np.ones(ROWS, bool), {"own": [1.0]})
+    for amount, there in ((0.0, ["own.load.load.wave"]), (0.5, ["own.load.load.wave", "own.load.torque.0"])):
+        names, found = own_columns(block, "load", OwnForm({"load.T": amount}, {"load.wave": 0.2}))
+        assert names == there and [function_of(n) for n in names] == [None, 0][: len(there)]
+        np.testing.assert_allclose(found[0], 0.2 * np.arange(ROWS))
 
 
 def test_a_column_whose_products_underflow_says_nothing():

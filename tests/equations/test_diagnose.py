@@ -95,6 +95,21 @@ def test_a_shape_of_the_back_emf_that_the_library_lacks_is_told_by_its_harmonics
         assert told["term"][name] == pytest.approx(wanted, abs=0.3 * abs(wanted) + 1e-3), name
 
 
+@pytest.mark.long
+def test_a_shape_of_the_back_emf_in_another_form_is_named():
+    """Of a size that the library's form hardly has, it had been another cause, left unknown."""
+    form = {"place": "emf", "form": "harmonics", "h3": 0.004, "h9": -0.004, "h11": 0.003, "h13": 0.003}
+    recordings = {
+        f"r{n}.nc": recorded(c, {"back_emf_shape": {"width": 119.5}}, (*[0.0] * 5, dT), n, theta_0=at, unlisted=(form,))
+        for n, (c, dT, at) in enumerate(PLANS)
+    }
+    names = list(recordings)
+    exclude = all_but("back_emf_shape", "cogging", "virtual_neutral", "voltage_gain", "unit_calibration")
+    verdict = diagnose("bench", recordings, (names[:3], names[3:]), ACTUATOR, NOISE, exclude).verdict
+    assert (verdict["verdict"], verdict["which"][0]["effects"]) == ("explained", ["back_emf_shape"])
+    assert verdict["shrinks"]["signal"]["closed"] > 0.95
+
+
 def test_what_the_fit_can_only_have_far_beyond_its_prior_is_no_absence_of_a_gap(monkeypatch):
     """The linear model has a nuisance at seven tolerances, the fit at four; no remainder speaks against it."""
     monkeypatch.setattr(machine, "beyond_tolerance", lambda *_: [])

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from emafault.actuator.shape import trapezoid_swept
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.linear import disturbance, raw_columns
 from emafault.effects import EFFECTS
-from emafault.equations import commutation
+from emafault.equations import commutation, waveform
 from emafault.equations.coordinates import OWN_ALONG
 from emafault.equations.point import Point, State
 
@@ -31,8 +32,31 @@ def test_a_prior_on_one_side_of_off_has_the_whole_range_of_the_catalogue(nominal
 def test_the_back_emf_has_harmonics_of_its_own_where_no_effect_is_another_shape(lacking, there):
     machine = machine_of({"a.nc": recorded()}, lacking)
     assert ("~harmonics_emf" in {u.id for u in machine.units}) is there
-    columns = next(b for b in machine.blocks({n: p.off for n, p in machine.parameters.items()}, "a.nc")).columns
-    assert ("emf.h13" in columns) is there
+    assert ("emf.h13" in {p.name for u in machine.units for p in u.parameters}) is there
+
+
+def test_a_shape_in_the_library_may_have_other_harmonics_and_rounded_corners():
+    """Their columns are there for its own form alone: they are no nuisances, and no other unit has them."""
+    machine = machine_of({"a.nc": recorded()})
+    (beside,) = machine.own_parameters.values()
+    assert all(machine.parameters[n].fixed for n in beside)
+    assert not {p.name for u in machine.units for p in u.parameters} & set(beside)
+    off = {n: p.off for n, p in machine.parameters.items()}
+    for block in machine.blocks(off, "a.nc", wanted={"back_emf_shape.width", *beside}):
+        seen = "back_emf_shape.width" in block.columns
+        assert set(beside) <= set(block.columns) if seen else not set(beside) & set(block.columns)
+
+
+def test_corners_are_rounded_as_by_an_average_over_the_ramp():
+    x = np.linspace(-7.0, 7.0, 40001)
+
+    def swept(at):
+        return trapezoid_swept(at, waveform.RAMP)[0]
+
+    half = 0.5 * waveform.RAMP
+    average = np.mean([swept(x + s) for s in np.linspace(-half, half, 401)], axis=0)
+    column = waveform.swept(Point({waveform.CORNERS: 0.0}, "a.nc"), x[:-1], x[1:]).slopes[waveform.CORNERS]
+    np.testing.assert_allclose(column, np.diff(average - swept(x)), atol=1e-6)
 
 
 def test_the_form_of_an_effect_may_differ_along_every_coordinate(nominal):

@@ -46,7 +46,7 @@ class Ladder:
         """
         out: list[White] = []
         of_each = {n.rsplit("@", 1)[0] for n in also if "@" in n}
-        shaped = {n for amounts in (inserted.own.values() if inserted else ()) for n in amounts}
+        shaped = {n for form in (inserted.own.values() if inserted else ()) for n in form.columns}
         for recording in self.recordings:
             own = f"@{recording}"
             free = [

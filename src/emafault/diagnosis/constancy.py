@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 
 from .evidence import Reduced, log_evidence
 from .fit import Bench, Fit
-from .linear import White, assemble
+from .linear import White, assemble, function_of
 from .model import WORDS
 from .set_prior import ONE_MORE_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR
 from .sets import OTHER_FORM, Model
@@ -70,8 +70,9 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     """Log posterior odds of a discrepancy as large as a unit of a set itself, or larger, against the unit in the
     library's form or one near it: what a unit takes up of another cause has such a discrepancy.
 
-    It is a combination of functions of speed, current, time and angle, which the unit's columns are multiplied by. The
-    unit's own prior, and that of how much of it each equation has, are the same on both sides.
+    It is a combination of functions of speed, current, time and angle, which the unit's columns are multiplied by; what
+    its form may have by parameters of its own is the unit's at any size. The unit's own prior, and that of how much of
+    it each equation has, are the same on both sides.
 
     Minus infinity for a unit that carries no form of its own, or none along anything.
     """
@@ -87,7 +88,7 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     own = [{names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)} for f in forms]
     near = [evidence(itself | form) for form in own]
     widest = {tuple(form): form for form in sorted(own, key=lambda form: max(form.values()))}
-    along = [(form, [n for n in form if not n.endswith(".0")]) for form in widest.values()]
+    along = [(form, [n for n in form if function_of(n)]) for form in widest.values()]
     far = [evidence(itself | form | {n: (0.0, s) for n in free}) for form, free in along if free for s in SHARES]
     if not far:
         return -np.inf

@@ -57,10 +57,11 @@ def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[t
     residual = bench.own_deviations(model, fit.normal)
     score = _by_column(_taken_out(bench, fit, model, unit, added) | added, aliases)
     wanted = [n for n in dict.fromkeys([*residual, *score]) if is_parameter(n)]
-    own = bench.amounts(model)
+    own = bench.own_forms(model)
+    columns = {*wanted, *(n for form in own.values() for n in form.columns)}
     out: dict[str, list[tuple[float, float, int]]] = {}
     for name in bench.recordings:
-        for block in bench.machine.blocks(bench.values(), name, wanted=set(wanted)):
+        for block in bench.machine.blocks(bench.values(), name, wanted=columns):
             weights = bench.carried[name].get(block.equation)
             if weights is None:
                 continue

@@ -1,7 +1,7 @@
 """Blocks of rows made white and compressed to normal matrices, one a recording and equation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -71,14 +71,41 @@ def _noise_of(block: Block) -> float:
     return float(np.sqrt(np.median(block.bands[0])))
 
 
-def own_columns(block: Block, unit: str, amounts: Mapping[str, float]) -> tuple[list[str], list[np.ndarray]]:
-    """What a unit of these amounts adds to a block, times functions of the coordinates, the first of them constant: its
-    form where that is not the library's."""
-    added = _added(block, amounts)
-    if np.sum(_white(block, added) ** 2) < SEEN:
-        return [], []
-    functions = block.coordinates["own"]
-    return [f"own.{unit}.{block.equation}.{f}" for f in range(len(functions))], [added * f for f in functions]
+@dataclass(frozen=True)
+class OwnForm:
+    """A unit that may have another form than the library's: ``amounts`` of its parameters from off, and ``sizes`` that
+    the parameters which its form may have besides are of, by column."""
+
+    amounts: Mapping[str, float]
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns that it is made of."""
+        return (*self.amounts, *self.sizes)
+
+
+OwnForms = Mapping[str, OwnForm]  # by unit
+
+
+def own_columns(block: Block, unit: str, own: OwnForm) -> tuple[list[str], list[np.ndarray]]:
+    """What a unit's amounts add to a block, times functions of the coordinates, the first of them constant, and what
+    else its form may have, at its size, which needs none of them: its form where that is not the library's."""
+    columns = {f"own.{unit}.{n}": x * block.columns[n] for n, x in own.sizes.items() if n in block.columns}
+    added = _added(block, own.amounts)
+    if np.sum(_white(block, added) ** 2) >= SEEN:
+        columns |= {_name(unit, block, f): added * function for f, function in enumerate(block.coordinates["own"])}
+    return list(columns), list(columns.values())
+
+
+def _name(unit: str, block: Block, function: int) -> str:
+    return f"own.{unit}.{block.equation}.{function}"
+
+
+def function_of(own: str) -> int | None:
+    """Number of the function that a column of an own form multiplies the unit's by; None where it is a parameter's."""
+    last = own.rpartition(".")[2]
+    return int(last) if last.isdigit() else None
 
 
 def _added(block: Block, amounts: Mapping[str, float]) -> np.ndarray:
@@ -88,7 +115,7 @@ def _added(block: Block, amounts: Mapping[str, float]) -> np.ndarray:
 
 
 def white_rows(
-    block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
+    block: Block, wanted: Sequence[str], remainder: bool, own: OwnForms | None = None
 ) -> tuple[list[str], np.ndarray]:
     """A block's columns as ``raw_columns`` has them: names, and (row, column) divided by the noise's covariance."""
     names, columns = raw_columns(block, wanted, remainder, own)
@@ -105,7 +132,7 @@ def _white(block: Block, x: np.ndarray) -> np.ndarray:
 
 
 def raw_columns(
-    block: Block, wanted: Sequence[str], remainder: bool, own: Mapping[str, Mapping[str, float]] | None = None
+    block: Block, wanted: Sequence[str], remainder: bool, own: OwnForms | None = None
 ) -> tuple[list[str], list]:
     """A block's columns ``wanted`` that act in it, with its remainder's and units' own forms, and its residual last:
     names without that of the residual, and columns, each (row,) or a scalar."""
@@ -114,8 +141,8 @@ def raw_columns(
     if remainder:
         more, extra = remainder_columns(block, _noise_of(block))
         names, columns = names + more, columns + extra
-    for unit, amounts in (own or {}).items():
-        more, extra = own_columns(block, unit, amounts)
+    for unit, form in (own or {}).items():
+        more, extra = own_columns(block, unit, form)
         names, columns = names + more, columns + extra
     return names, [*columns, block.residual]
 
@@ -163,7 +190,7 @@ def disturbance(
     disturbed: Block,
     names: Sequence[str],
     weights: Weights | None,
-    own: Mapping[str, Mapping[str, float]] | None = None,
+    own: OwnForms | None = None,
 ) -> np.ndarray:
     """(column, column) what noise adds to the products of a block's columns ``names`` and its residual, the last.
 
@@ -173,12 +200,14 @@ def disturbance(
     """
     changes = {n: disturbed.columns.get(n, 0.0) - block.columns[n] for n in names if n in block.columns}
     wanted = set(names)
-    for unit, amounts in (own or {}).items():  # an own form has the noise of what it is a form of
-        more = _added(disturbed, amounts) - _added(block, amounts)
+    for unit, form in (own or {}).items():  # an own form has the noise of what it is a form of
+        more = _added(disturbed, form.amounts) - _added(block, form.amounts)
         for f, function in enumerate(block.coordinates["own"]):
-            name = f"own.{unit}.{block.equation}.{f}"
-            if name in wanted:
+            if (name := _name(unit, block, f)) in wanted:
                 changes[name] = more * function
+        for n, size in form.sizes.items():
+            if (name := f"own.{unit}.{n}") in wanted:
+                changes[name] = size * (disturbed.columns[n] - block.columns[n])
     if "changes" in block.coordinates:
         driven = _driven_columns(block, _noise_of(block), block.coordinates["changes"])
         changes |= {n: c for n, c in driven.items() if n in wanted}

@@ -7,7 +7,7 @@ import numpy as np
 
 from .described import Described, Proposal, scanned, with_forms
 from .left import Left
-from .linear import FEW, White, assemble, compressed_columns, correct, disturbance, raw_columns, weights_from
+from .linear import FEW, OwnForms, White, assemble, compressed_columns, correct, disturbance, raw_columns, weights_from
 from .model import SETTINGS, Block
 from .whitening import Weights
 
@@ -18,7 +18,7 @@ KEPT = 2e8  # bytes of columns that a process keeps from a pass to the one that 
 class Task:
     """What is to be linearised: where, by which columns, with which equations' remainders (None: all).
 
-    ``own``: sizes of the units that carry their own form; ``full``: deviations of a full model at this very task, from
+    ``own``: units that carry their own form; ``full``: deviations of a full model at this very task, from
     whose residual the weights are renewed; ``again`` says that a pass with ``full`` follows; ``corrected`` takes out
     what the noise in the regressors adds.
     """
@@ -26,12 +26,17 @@ class Task:
     values: Mapping[str, float]
     wanted: tuple[str, ...]
     remainders: frozenset[str] | None = None
-    own: Mapping[str, Mapping[str, float]] | None = None
+    own: OwnForms | None = None
     full: Mapping[str, float] | None = None
     leads: bool = False
     again: bool = False
     corrected: bool = True
     on: frozenset[str] = frozenset()
+
+    @property
+    def columns(self) -> set[str]:
+        """What blocks are to have a column by."""
+        return {*self.wanted, *(n for form in (self.own or {}).values() for n in form.columns)}
 
 
 Carried = dict[str, Weights]  # of a recording's blocks, by equation
@@ -68,7 +73,7 @@ class Linearisation:
         if task.full is not None:
             weights = renewed
         if task.corrected:
-            disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=set(task.wanted))
+            disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=task.columns)
             for white, block, other in zip(out, blocks, disturbed, strict=True):
                 own = task.own if block.equation not in SETTINGS else None
                 correct(white, disturbance(block, other, white.names, weights.get(block.equation), own))
@@ -108,7 +113,7 @@ class Linearisation:
         cells.cells(lambda b: np.zeros(rows, int), 1, 0)
 
     def _blocks(self, task: Task, recording: str) -> list[Block]:
-        return self.machine.blocks(task.values, recording, wanted=set(task.wanted))
+        return self.machine.blocks(task.values, recording, wanted=task.columns)
 
 
 def _size(blocks: list[Block]) -> int:

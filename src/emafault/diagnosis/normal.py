@@ -9,7 +9,7 @@ import numpy as np
 from .bounded import minimum_within
 from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
-from .linear import OWN_FORM, OWN_SHARES, White, assemble, full_model, white_rows
+from .linear import OWN_FORM, OWN_SHARES, OwnForm, White, assemble, full_model, function_of, white_rows
 from .linearisation import Carried, Linearisation, Task
 from .model import Parameter, Unit, Variant
 from .point import Point, is_parameter
@@ -74,7 +74,7 @@ class NormalEquations(Point):
         left = None
         if model is not None:
             left = frozenset(u.split(":", 1)[1] for u in model.units if u.startswith("remainder:"))
-        return Task(self.values(), wanted, left, self.amounts(model), corrected=corrected, on=frozenset(self.on))
+        return Task(self.values(), wanted, left, self.own_forms(model), corrected=corrected, on=frozenset(self.on))
 
     def _columns_of(self, model: Model | None) -> tuple[list[str], dict[str, str]]:
         """Columns of units, all or those of a model, and aliases."""
@@ -130,9 +130,10 @@ class NormalEquations(Point):
                 out.append((block.equation, rows[:, :-1] @ d, block.coordinates))
         return out
 
-    def amounts(self, model: Model | None) -> dict[str, dict[str, float]]:
-        """Sizes from off, by column, of the units that carry their own form."""
+    def own_forms(self, model: Model | None = None) -> dict[str, OwnForm]:
+        """Units that carry their own form, all or those of a model."""
         out = {}
+        beside = getattr(self.machine, "own_parameters", {})  # by unit, what else an own form may have
         for unit in self.units:
             if unit.id not in self.sizes or (model is not None and unit.id not in model.units):
                 continue
@@ -140,7 +141,8 @@ class NormalEquations(Point):
             if unit.id in self.on:  # of what the point holds: an effect of no size has no form
                 here = self.active(unit)[0].parameters if unit.on is not None else unit.parameters
                 sizes = self.sizes[unit.id] = {p.name: -self.prior(p.name)[2] for p in here}
-            out[unit.id] = {self.parameters[n].alias or n: d for n, d in sizes.items()}
+            own = {self.parameters[n].alias or n: d for n, d in sizes.items()}
+            out[unit.id] = OwnForm(own, {n: self.parameters[n].sd for n in beside.get(unit.id, ())})
         return out
 
     def normal(self, whites: Sequence[White], model: Model | None = None) -> Normal:
@@ -268,9 +270,12 @@ class NormalEquations(Point):
         if not len(own):
             return []
         every = [own]
-        where = {k: reduced.names[k].split(".")[2:] for k in own.tolist()}
+        beside = [k for k in own.tolist() if function_of(reduced.names[k]) is None]
+        if beside:
+            every.append(np.array(beside, int))
+        where = {k: reduced.names[k].split(".")[2:] for k in own.tolist() if k not in beside}
         of = {e: self.machine.own_families(e) for e in dict.fromkeys(e for e, _ in where.values())}
-        if all(of.values()):
+        if of and all(of.values()):
             every.append(np.array([k for k, (_, f) in where.items() if f == "0"], int))  # by equation
             for n in range(min(map(len, of.values()))):
                 every.append(np.array([k for k, (e, f) in where.items() if int(f) in of[e][n]], int))

@@ -7,6 +7,7 @@ import numpy as np
 
 from .described import Described
 from .evidence import SETTLED, Normal
+from .linear import OwnForm
 from .normal import NormalEquations
 from .point import Place, is_parameter
 from .search import NEAR, Search
@@ -45,13 +46,12 @@ class Began:
 class Inserted:
     """A fitted set as a model of other recordings: all values, and what stands beside them.
 
-    ``beside``: coefficients of remainders and own forms by column; ``own``: sizes of the units that carry their own
-    form.
+    ``beside``: coefficients of remainders and own forms by column; ``own``: units that carry their own form.
     """
 
     values: dict[str, float]
     beside: dict[str, float]
-    own: dict[str, dict[str, float]]
+    own: dict[str, OwnForm]
 
 
 def between(one: Mapping[str, float], other: Mapping[str, float], share: float) -> dict[str, float]:
@@ -175,11 +175,7 @@ class Settling(NormalEquations):
         if not all(map(is_parameter, found.deviations)):
             # the point need not be where the model would have it, along what its own columns make up for
             beside = self.beside(found, self._fitted(found)[1])
-        own = {
-            u: {self.parameters[n].alias or n: d for n, d in amounts.items()}
-            for u, amounts in self.sizes.items()
-            if u in found.units
-        }
+        own = self.own_forms(found)
         self.go_to(kept)
         self.sizes = sizes
         self._inserted[key] = Inserted(values, beside, own)

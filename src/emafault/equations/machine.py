@@ -1,6 +1,7 @@
 """The reference actuator for the diagnosis: its parameters, effects and forms, and its equations at a point."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -72,8 +73,14 @@ class ReferenceActuator:
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
         self.units += [*measuring_chain(actuator, self.recordings, self.reference, exclude), *controller(actuator)]
-        # an effect that is another shape takes a form of its own
-        if not any(effect_name(m) in self.effects for m in with_hook("harmonics")):
+        #: by effect, parameters that a form of its own may have: another shape of the back-EMF has other harmonics
+        self.own_parameters: dict[str, tuple[str, ...]] = {}
+        shapes = [m for m in map(effect_name, with_hook("harmonics")) if m in self.effects]
+        if shapes:
+            beside = {p.name: replace(p, fixed=True) for p in waveform.parameters()}
+            self.own_parameters = dict.fromkeys(shapes, tuple(beside))
+            self.parameters |= beside
+        else:
             self.units.append(waveform.unit())
         lacking = [e for e in self.catalogue.values() if e.id in exclude]
         self.units += beyond_tolerance(lacking, actuator, self.parameters)

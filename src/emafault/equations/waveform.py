@@ -12,11 +12,28 @@ from .point import Point
 
 UNIT = "~harmonics_emf"
 NAMES = {n: f"emf.{name}" for n, name in zip(ORDERS, OF_SHAPE["harmonics"], strict=True)}
+CORNERS = "emf.corners"  # of a trapezoid that is averaged over the length of its own ramp, as a share of that
+RAMP = np.pi / 6.0  # electrical rad, of the nominal trapezoid
+#: where its slope changes (electrical rad), and which way
+CHANGES = ((RAMP, -1.0), (np.pi - RAMP, -1.0), (np.pi + RAMP, 1.0), (2.0 * np.pi - RAMP, 1.0))
 
 
 def swept(p: Point, low: np.ndarray, high: np.ndarray) -> Dual | float:
     """Integral over the electrical angle from ``low`` to ``high`` (rad) of what is added to the trapezoid."""
-    return integral({n: p(name) for n, name in NAMES.items()}, low, high)
+    total = integral({n: p(name) for n, name in NAMES.items()}, low, high)
+    corners = p(CORNERS)
+    return total + corners * (_rounding(high) - _rounding(low)) if corners.slopes or corners.value else total
+
+
+def _rounding(angle: np.ndarray) -> np.ndarray:
+    """Integral, over a whole turn nothing, of what the average over a ramp's length changes about the corners: there it
+    is (h - |u|)^2 / (4 h ramp) in the direction of the change, u from the corner, up to half the length h."""
+    x, h = np.mod(angle, 2.0 * np.pi), 0.5 * RAMP
+    total = np.zeros_like(x)
+    for at, sign in CHANGES:
+        u = np.clip(x - at, -h, h)
+        total += sign * np.where(u < 0.0, (h + u) ** 3, 2.0 * h**3 - (h - u) ** 3)
+    return total / (12.0 * h * RAMP)
 
 
 def integral(sizes: Mapping[int, Dual], low: np.ndarray, high: np.ndarray) -> Dual | float:
@@ -41,9 +58,15 @@ def _cosines(angle: np.ndarray, highest: int) -> dict[int, np.ndarray]:
     return out
 
 
-def unit() -> Unit:
-    """The shape as a candidate cause: one harmonic, or all; as wide as those of the catalogue may be."""
+def parameters() -> list[Parameter]:
+    """The harmonics, each as wide as those of the catalogue may be, and the rounding of the corners."""
     listed = [p for e in EFFECTS.values() for n, p in e.parameters.items() if n in OF_SHAPE["harmonics"]]
     width = max(abs(x) for p in listed for x in (p.low, p.high))
-    every = [Parameter(name, 0.0, 0.0, width, "1") for name in NAMES.values()]
+    harmonics = [Parameter(name, 0.0, 0.0, width, "1") for name in NAMES.values()]
+    return [*harmonics, Parameter(CORNERS, 0.0, 0.0, 1.0, "1")]
+
+
+def unit() -> Unit:
+    """The shape as a candidate cause, which both simulators have: one harmonic, or all."""
+    every = [p for p in parameters() if p.name != CORNERS]
     return Unit(UNIT, "form", ("electrical", "torque"), [*(Variant([p]) for p in every), Variant(every)])

@@ -121,10 +121,6 @@ class MeasuredBench(Bench):
         self.sizes = chosen
         return bool(chosen)
 
-    def own_forms(self) -> dict[str, dict[str, float]]:
-        """Sizes from off, by column, of the units that carry their own form."""
-        return self.amounts(None)
-
     def candidates(self, reduced: Reduced) -> tuple[list[Unit], dict[tuple[str, int], Candidate]]:
         """See ``Bench``: each remainder smooth, fast along a coordinate or free, of any size up to the largest gap."""
         _, found = super().candidates(reduced)

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..diagnosis.evidence import Normal
 from ..diagnosis.fit import NOTHING, Fit
+from ..diagnosis.linear import OwnForms
 from ..diagnosis.naming import Reading, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.sets import Choice, Model
@@ -26,7 +27,7 @@ class Settled:
 
     values: Mapping[str, float]
     functions: Mapping[str, float]
-    own: Mapping[str, Mapping[str, float]]
+    own: OwnForms
 
 
 @dataclass(frozen=True)

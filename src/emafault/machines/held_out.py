@@ -8,7 +8,7 @@ from scipy.linalg import solve_triangular
 
 from ..diagnosis.closure import closed, placebo, rms, rows
 from ..diagnosis.evidence import CLEAR
-from ..diagnosis.linear import White, assemble, own_columns, remainder_columns
+from ..diagnosis.linear import OwnForms, White, assemble, own_columns, remainder_columns
 from ..diagnosis.point import is_parameter
 from .adapter import Recorded
 
@@ -50,17 +50,17 @@ def whitened(
     recorded: Recorded,
     recordings: Sequence[str],
     values: Mapping[str, float],
-    own: Mapping[str, Mapping[str, float]] | None = None,
+    own: OwnForms | None = None,
 ) -> list[White]:
     """Residuals at frozen values under the covariance of all errors together, with the functions of remainders and of
     the units that carry their ``own`` form."""
     out = []
     for name in recordings:
         for r in recorded.rows[name]:
-            block = recorded.block(r, values, {n for amounts in (own or {}).values() for n in amounts})
+            block = recorded.block(r, values, {n for form in (own or {}).values() for n in form.columns})
             names, columns = remainder_columns(block, float(np.sqrt(np.median(r.variance))))
-            for unit, amounts in (own or {}).items():
-                more, extra = own_columns(block, unit, amounts)
+            for unit, form in (own or {}).items():
+                more, extra = own_columns(block, unit, form)
                 names, columns = names + more, columns + extra
             lower = np.linalg.cholesky(r.covariance)
             white = solve_triangular(lower, np.column_stack([*columns, block.residual]), lower=True)
