@@ -157,3 +157,16 @@ def test_a_large_drag_of_some_power_is_that_and_no_sum_of_other_frictions():
     (form,) = [f for f in bench.described if f.id in leading.units]
     assert len(leading.units) == 1 and form.word == "power"
     assert form.values["exponent"] == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("own", "beyond"), [(1.0, 0.0), (0.6, 0.0), (0.7, -0.2), (1.2, 0.3)])
+def test_a_value_beyond_tolerance_lies_beyond_it_from_wherever_the_point_is(nominal, own, beyond):
+    """At the edges of the hole a friction has 0.6 and 1.4; taken from a point at 0.6, one of 0.55 had been within."""
+    fit = Bench(nominal, list(nominal.recordings))
+    fit.point |= {"friction_level.scale": own, "friction_level.scale+": beyond}
+    (variant,) = next(u for u in fit.units if u.id == "friction_level").variants
+    (name,) = (p.name for p in variant.parameters)
+    _, width, off = fit.prior(name)
+    for edge, value in zip(fit._hole(variant)[:, 0], (0.6, 1.4), strict=True):
+        there = fit.after({"friction_level.scale": fit.prior("friction_level.scale")[2], name: off + edge * width})
+        assert sum(there.values()) == pytest.approx(value)

@@ -286,14 +286,15 @@ class NormalEquations(Point):
         edges = np.array([-1.0, 1.0])[:, None] * np.array(variant.hole)
         for k, p in enumerate(variant.parameters if edges.size else ()):
             if p.vanishes is not None:  # the tolerance is one of the value, the deviation that of its logarithm
-                sd = p.sd / abs(self.parameters[p.alias or p.name].off - p.vanishes)
+                share = p.sd / abs(self.parameters[p.alias or p.name].off - p.vanishes)
+                u = abs(self._factor(p.name)[0])
                 with np.errstate(divide="ignore"):
-                    edges[:, k] = np.log(np.maximum(1.0 + edges[:, k] * sd, 0.0)) / sd
+                    edges[:, k] = np.log(np.maximum(1.0 + edges[:, k] * share, 0.0)) * u / self.prior(p.name)[1]
         return edges
 
     def _tolerance(self, p: Parameter) -> float:
         """Tolerance of the quantity that a parameter is beyond, as a share of the parameter's prior."""
-        return self.parameters[p.alias].sd / p.sd if p.alias is not None else 0.0
+        return self.prior(p.alias)[1] / self.prior(p.name)[1] if p.alias is not None else 0.0
 
     # ---- a step
     def move(self, model: Model, normal: Normal) -> float:
