@@ -177,10 +177,11 @@ class ReferenceActuator:
             if self.large:
                 self._late.clear()
             self._late[name] = {e: -x for e, x in self.seen_in("angle", name, turned).items()}
+        state = State(_less(self.recordings[name], less), Point(values, name, ()))
         for block in blocks:
             shown = self._late[name].get(block.equation)
             if shown is None:
-                shown = -self.seen_at(values, name, block.equation, turned, less)
+                shown = -_seen(state, block.equation, turned)
             block.columns |= {n: _by_lag(n, values.get(n, 0.0)) @ shown for n in names}
 
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
@@ -224,11 +225,7 @@ class ReferenceActuator:
         """(column, row) what signals x (column, sample) on the angle's channel take out of the residuals of one of the
         equations in which that depends on the point: on what the sensor makes of a speed, or on where within an
         interval an edge lies. ``less`` as in ``blocks``."""
-        state = State(_less(self.recordings[name], less), Point(values, name, ()))
-        if equation == "sensor_speed":
-            return np.array([sensor_speed.seen_rate(state, row) for row in x])
-        rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
-        return self.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
+        return _seen(State(_less(self.recordings[name], less), Point(values, name, ())), equation, x)
 
     def _back_emf(self, state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
         """The same of a relative change of phase j's back-EMF coefficient: in its voltage and in the torque."""
@@ -316,6 +313,14 @@ class ReferenceActuator:
                 self._functions.clear()
             self._functions[rec.name] = functions_of(rec.rows_from)
         return self._functions[rec.name]
+
+
+def _seen(state: State, equation: str, x: np.ndarray) -> np.ndarray:
+    """(column, row) what ``seen_at`` gives of a recording at a point."""
+    if equation == "sensor_speed":
+        return np.array([sensor_speed.seen_rate(state, row) for row in x])
+    rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
+    return state.rec.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
 
 
 def _turned(rec: Signals) -> np.ndarray:
