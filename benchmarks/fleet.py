@@ -12,6 +12,7 @@ import resource
 import subprocess
 import tempfile
 import time
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -107,7 +108,8 @@ def report(fleet: Path, truth: dict[str, str]) -> None:
         f"with an effect {len(with_effect)}, it alone named {right}; without {len(without)}, none named {quiet}; ",
         end="",
     )
-    print(f"another name in {wrong}; refused {refused}")
+    said = Counter(rows[n]["verdict"] for n in without)
+    print(f"another name in {wrong}; refused {refused}; said of those without: {dict(said)}")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,10 @@ def test_a_prior_on_one_side_of_off_has_the_whole_range_of_the_catalogue(nominal
 def test_the_back_emf_has_harmonics_of_its_own_where_no_effect_is_another_shape(lacking, there):
     machine = machine_of({"a.nc": recorded()}, lacking)
     assert ("~harmonics_emf" in {u.id for u in machine.units}) is there
-    assert ("emf.h13" in {p.name for u in machine.units for p in u.parameters}) is there
+    wanted = {p.name for u in machine.units for p in u.parameters}
+    off = {n: p.off for n, p in machine.parameters.items()}
+    assert ("emf.h13" in wanted) is there
+    assert ("emf.h13" in next(iter(machine.blocks(off, "a.nc", wanted=wanted))).columns) is there
 
 
 def test_a_shape_in_the_library_may_have_other_harmonics_and_rounded_corners():

@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import Definite, Normal
 from .fit import Bench
-from .linear import White, assemble, compressed, correct, disturbance, white_rows
+from .linear import White, assemble, columns_of_forms, compressed, correct, disturbance, white_rows
 from .model import SETTINGS, Block
 from .point import is_parameter
 from .settling import Inserted
@@ -46,7 +46,7 @@ class Ladder:
         """
         out: list[White] = []
         of_each = {n.rsplit("@", 1)[0] for n in also if "@" in n}
-        shaped = {n for form in (inserted.own.values() if inserted else ()) for n in form.columns}
+        shaped = columns_of_forms(inserted.own if inserted else None)
         for recording in self.recordings:
             own = f"@{recording}"
             free = [

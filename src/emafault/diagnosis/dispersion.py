@@ -14,7 +14,7 @@ import numpy as np
 from .constancy import SCATTER, prior_of
 from .evidence import Definite
 from .fit import Bench, Fit
-from .linear import white_rows
+from .linear import columns_of_forms, white_rows
 from .model import SETTINGS
 from .point import is_parameter
 from .sets import Model
@@ -58,7 +58,7 @@ def _scores(bench: Bench, fit: Fit, model: Model, unit: str) -> dict[str, list[t
     score = _by_column(_taken_out(bench, fit, model, unit, added) | added, aliases)
     wanted = [n for n in dict.fromkeys([*residual, *score]) if is_parameter(n)]
     own = bench.own_forms(model)
-    columns = {*wanted, *(n for form in own.values() for n in form.columns)}
+    columns = {*wanted} | columns_of_forms(own)
     out: dict[str, list[tuple[float, float, int]]] = {}
     for name in bench.recordings:
         for block in bench.machine.blocks(bench.values(), name, wanted=columns):

@@ -88,6 +88,11 @@ class OwnForm:
 OwnForms = Mapping[str, OwnForm]  # by unit
 
 
+def columns_of_forms(own: OwnForms | None) -> set[str]:
+    """Names of the columns that own forms are made of."""
+    return {n for form in (own or {}).values() for n in form.columns}
+
+
 def own_columns(block: Block, unit: str, own: OwnForm) -> tuple[list[str], list[np.ndarray]]:
     """What a unit's amounts add to a block, times functions of the coordinates, the first of them constant, and what
     else its form may have, at its size, which needs none of them: its form where that is not the library's."""

@@ -7,7 +7,18 @@ import numpy as np
 
 from .described import Described, Proposal, scanned, with_forms
 from .left import Left
-from .linear import FEW, OwnForms, White, assemble, compressed_columns, correct, disturbance, raw_columns, weights_from
+from .linear import (
+    FEW,
+    OwnForms,
+    White,
+    assemble,
+    columns_of_forms,
+    compressed_columns,
+    correct,
+    disturbance,
+    raw_columns,
+    weights_from,
+)
 from .model import SETTINGS, Block
 from .whitening import Weights
 
@@ -36,7 +47,7 @@ class Task:
     @property
     def columns(self) -> set[str]:
         """What blocks are to have a column by."""
-        return {*self.wanted, *(n for form in (self.own or {}).values() for n in form.columns)}
+        return {*self.wanted} | columns_of_forms(self.own)
 
 
 Carried = dict[str, Weights]  # of a recording's blocks, by equation

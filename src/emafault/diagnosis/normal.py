@@ -142,6 +142,7 @@ class NormalEquations(Point):
                 here = self.active(unit)[0].parameters if unit.on is not None else unit.parameters
                 sizes = self.sizes[unit.id] = {p.name: -self.prior(p.name)[2] for p in here}
             own = {self.parameters[n].alias or n: d for n, d in sizes.items()}
+            # the prior of every column of an own form is OWN_FORM wide: of these as wide as their own
             out[unit.id] = OwnForm(own, {n: self.parameters[n].sd / OWN_FORM for n in beside.get(unit.id, ())})
         return out
 

@@ -8,7 +8,7 @@ from scipy.linalg import solve_triangular
 
 from ..diagnosis.closure import closed, placebo, rms, rows
 from ..diagnosis.evidence import CLEAR
-from ..diagnosis.linear import OwnForms, White, assemble, own_columns, remainder_columns
+from ..diagnosis.linear import OwnForms, White, assemble, columns_of_forms, own_columns, remainder_columns
 from ..diagnosis.point import is_parameter
 from .adapter import Recorded
 
@@ -57,7 +57,7 @@ def whitened(
     out = []
     for name in recordings:
         for r in recorded.rows[name]:
-            block = recorded.block(r, values, {n for form in (own or {}).values() for n in form.columns})
+            block = recorded.block(r, values, columns_of_forms(own))
             names, columns = remainder_columns(block, float(np.sqrt(np.median(r.variance))))
             for unit, form in (own or {}).items():
                 more, extra = own_columns(block, unit, form)
