@@ -14,11 +14,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 BLOCK = 2000  # rows whose derivatives are in memory at a time
 
-#: activation and its derivative, both of the pre-activation
+#: activation of the pre-activation, and its derivative by it as a function of the activation
 ACTIVATIONS: dict[str, tuple[Callable, Callable]] = {
-    "tanh": (np.tanh, lambda z: 1.0 - np.tanh(z) ** 2),
-    "sigmoid": (lambda z: 1.0 / (1.0 + np.exp(-z)), lambda z: 0.25 / np.cosh(0.5 * z) ** 2),
-    "relu": (lambda z: np.where(z.real > 0, z, 0.0), lambda z: (z > 0).astype(float)),
+    "tanh": (np.tanh, lambda a: 1.0 - a * a),
+    "sigmoid": (lambda z: 1.0 / (1.0 + np.exp(-z)), lambda a: a * (1.0 - a)),
+    "relu": (lambda z: np.where(z.real > 0, z, 0.0), lambda a: (a > 0).astype(float)),
 }
 #: one matrix a layer, (output, input + 1), the bias in the last column
 Weights = list[np.ndarray]
@@ -39,6 +39,22 @@ def initialise(sizes: tuple[int, ...], rng: np.random.Generator) -> Weights:
     return [np.hstack([rng.normal(0.0, np.sqrt(1.0 / i), (o, i)), np.zeros((o, 1))]) for i, o in pairwise(sizes)]
 
 
+def flattened(weights: Weights) -> np.ndarray:
+    """All weights (weight,), layer after layer and row-major in each."""
+    return np.concatenate([W.ravel() for W in weights])
+
+
+def shaped(w: np.ndarray, like: Weights) -> Weights:
+    """Weights of the shapes of others, from ``flattened`` ones."""
+    ends = np.cumsum([0, *(W.size for W in like)])
+    return [w[start:end].reshape(W.shape) for W, (start, end) in zip(like, pairwise(ends))]
+
+
+def is_no_bias(weights: Weights) -> np.ndarray:
+    """(weight,) which of ``flattened`` weights are of an input, and decay."""
+    return np.concatenate([(np.arange(W.size) % W.shape[1] != W.shape[1] - 1) for W in weights])
+
+
 def outputs(weights: Weights, activation: str, x: np.ndarray) -> np.ndarray:
     """Outputs (row, output) of a dense network with a linear last layer; complex inputs pass through."""
     function = ACTIVATIONS[activation][0]
@@ -53,9 +69,9 @@ def _layers(weights: Weights, activation: str, x: np.ndarray):
     ones = np.ones((len(x), 1))
     inputs, slopes = [np.hstack([x, ones])], []
     for W in weights[:-1]:
-        z = inputs[-1] @ W.T
-        slopes.append(slope(z))
-        inputs.append(np.hstack([function(z), ones]))
+        activations = function(inputs[-1] @ W.T)
+        slopes.append(slope(activations))
+        inputs.append(np.hstack([activations, ones]))
     y = inputs[-1] @ weights[-1].T
     deltas = [np.broadcast_to(np.eye(y.shape[1]), (len(x), y.shape[1], y.shape[1]))]
     for W, d in zip(weights[:0:-1], slopes[::-1]):
@@ -134,22 +150,16 @@ def train_lm(
     the weights and the learning curve
     """
     x, t = train
-    shapes, count = [W.shape for W in weights], t.size
-    splits = np.cumsum([W.size for W in weights])[:-1]
-
-    def unpack(w: np.ndarray) -> Weights:
-        return [part.reshape(shape) for part, shape in zip(np.split(w, splits), shapes)]
+    count, w = t.size, flattened(weights)
 
     def error(w: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> float:
-        return float(np.mean((outputs(unpack(w), activation, rows[0]) - rows[1]) ** 2))
+        return float(np.mean((outputs(shaped(w, weights), activation, rows[0]) - rows[1]) ** 2))
 
-    w = np.concatenate([W.ravel() for W in weights])
-    decayed = np.concatenate([(np.arange(W.size) % W.shape[1] != W.shape[1] - 1) for W in weights])
-    decay = weight_decay * decayed / w.size
+    decay = weight_decay * is_no_bias(weights) / w.size
     best, best_error, fails = w, np.inf, 0
     curve = LearningCurve(stopped="epochs")
     for epoch in range(epochs + 1):
-        JJ, Je, sse = normal_equations(unpack(w), activation, x, t)
+        JJ, Je, sse = normal_equations(shaped(w, weights), activation, x, t)
         JJ /= count
         gradient = Je / count + decay * w
         JJ[np.diag_indices_from(JJ)] += decay
@@ -183,4 +193,4 @@ def train_lm(
         else:
             curve.stopped = "damping"
             break
-    return unpack(best), curve
+    return shaped(best, weights), curve

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .adam import train_adam
 from .levenberg_marquardt import LearningCurve, Weights, initialise, outputs, train_lm
 from .network import Network, Scaler
 from .settings import NetworkSettings, TrainingSettings
-
-Rows = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -77,9 +76,9 @@ def train(
             whiten = np.linalg.inv(np.linalg.cholesky(covariance))
             mix, weights = whiten @ mix, [*weights[:-1], whiten @ weights[-1]]
         rows = [(x[part], t[part] @ mix.T) for part in (fit, validation)]
-        optimise = train_lm if how.optimiser == "levenberg_marquardt" else _train_adam
+        optimise = train_lm if how.optimiser == "levenberg_marquardt" else train_adam
         extra: dict[str, Any] = {}
-        if optimise is _train_adam:
+        if optimise is train_adam:
             extra = {"learning_rate": how.learning_rate, "batch": how.batch, "seed": seed}
         weights, curve = optimise(
             weights,
@@ -109,61 +108,3 @@ def torch_layers(weights: Weights, activation: str) -> list:
             layer.bias.copy_(torch.from_numpy(W[:, -1].copy()))
         layers += [layer, function()]
     return layers[:-1]
-
-
-def _train_adam(
-    weights: Weights,
-    activation: str,
-    train: Rows,
-    validation: Rows,
-    *,
-    epochs: int,
-    max_fail: int,
-    weight_decay: float,
-    learning_rate: float,
-    batch: int,
-    seed: int,
-) -> tuple[Weights, LearningCurve]:
-    """Adam in shuffled batches with a cosine fall of the learning rate; the weights of the best validation epoch.
-
-    An epoch is ten passes over the rows, so that ``epochs`` and ``max_fail`` cost about what they do with
-    Levenberg-Marquardt.
-    """
-    import torch
-
-    passes = 10
-    module = torch.nn.Sequential(*torch_layers(weights, activation))
-    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, epochs, learning_rate / 100.0)
-    order = torch.Generator().manual_seed(seed)
-    (x, t), (xv, tv) = [(torch.from_numpy(a), torch.from_numpy(b)) for a, b in (train, validation)]
-    matrices = [p for name, p in module.named_parameters() if name.endswith("weight")]
-    size = sum(p.numel() for p in module.parameters())
-
-    def read() -> Weights:
-        linear = [layer for layer in module if isinstance(layer, torch.nn.Linear)]
-        return [torch.column_stack([l.weight, l.bias]).detach().numpy().copy() for l in linear]
-
-    best, best_error, fails = read(), np.inf, 0
-    curve = LearningCurve(stopped="epochs")
-    for epoch in range(epochs + 1):
-        with torch.no_grad():
-            curve.train.append(float(torch.mean((module(x) - t) ** 2)))
-            curve.validation.append(float(torch.mean((module(xv) - tv) ** 2)))
-        if curve.validation[-1] < best_error:
-            best, best_error, curve.best_epoch, fails = read(), curve.validation[-1], epoch, 0
-        else:
-            fails += 1
-        if fails >= max_fail:
-            curve.stopped = "validation"
-            break
-        for _ in range(passes if epoch < epochs else 0):
-            for rows in torch.randperm(len(x), generator=order).split(batch):
-                optimiser.zero_grad()
-                loss = torch.mean((module(x[rows]) - t[rows]) ** 2)
-                if weight_decay:
-                    loss = loss + weight_decay / size * sum((p**2).sum() for p in matrices)
-                loss.backward()
-                optimiser.step()
-        schedule.step()
-    return best, curve
