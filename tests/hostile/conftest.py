@@ -14,8 +14,9 @@ import pytest
 from emafault import closed_form, config
 from emafault.cli import main
 from emafault.config import composition, draws, separate
-from emafault.identification.fitting import Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import Prior, Recipe, fit_identifier
 from emafault.identification.posterior import Knowledge
+from emafault.identification.rows import TrainingRows
 from emafault.identification.settings import NetworkSettings, TrainingSettings
 from emafault.paths import CONF
 from emafault.study.networks import seed_folder, write_json, write_yaml

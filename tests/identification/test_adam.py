@@ -41,7 +41,7 @@ def test_steps_are_those_of_torch(rows, decay):
     weights, epochs = network(2), 4
     # of batches of all rows the order does not matter
     how = {"epochs": epochs, "max_fail": 100, "weight_decay": decay, "learning_rate": 0.02, "batch": ROWS, "seed": 0}
-    found, curve = train_adam(weights, "tanh", rows, rows, **how)
+    found, curve = train_adam(weights, "tanh", [rows], [rows], **how)
 
     size = sum(W.size for W in weights)
     tensors = [torch.tensor(W, requires_grad=True) for W in weights]
@@ -67,7 +67,7 @@ def test_the_best_epoch_is_kept_and_training_stops(rows):
     # rows to stop by that have nothing to do with those that are learnt
     strange = rows[0][::-1], -rows[1]
     how = {"epochs": 200, "max_fail": 5, "weight_decay": 0.0, "learning_rate": 0.05, "batch": 8, "seed": 1}
-    found, curve = train_adam(network(1), "sigmoid", rows, strange, **how)
+    found, curve = train_adam(network(1), "sigmoid", [rows], [strange], **how)
     assert curve.stopped == "validation" and len(curve.validation) == curve.best_epoch + 6
     kept = float(np.mean((outputs(found, "sigmoid", strange[0]) - strange[1]) ** 2))
     assert kept == min(curve.validation) and kept < curve.validation[-1]

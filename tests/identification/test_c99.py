@@ -14,8 +14,9 @@ from emafault.errors import InputError
 from emafault.faults import sample_faults
 from emafault.identification.c99 import write_c
 from emafault.identification.export import export_calibrated_onnx, export_onnx
-from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, fit_identifier
 from emafault.identification.posterior import nine_forward, nominal_nine
+from emafault.identification.rows import TrainingRows
 from emafault.identification.settings import NetworkSettings, TrainingSettings
 
 from .conftest import RANGES

@@ -5,7 +5,8 @@ import pytest
 
 from emafault.errors import InputError
 from emafault.identification import evaluation
-from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, fit_identifier
+from emafault.identification.rows import TrainingRows
 
 
 def test_metrics_by_hand(width):

@@ -10,10 +10,11 @@ from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification import evaluation, fitting
 from emafault.identification.export import export_onnx
-from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, fit_identifier
 from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import ConformalIntervals, coverage, worse_than_folds
 from emafault.identification.posterior import Knowledge, nine_forward, nominal_nine
+from emafault.identification.rows import TrainingRows
 from emafault.reconstruction.features import Features
 
 from .conftest import NOISE, RANGES
@@ -88,10 +89,10 @@ def test_a_network_that_ended_in_a_worse_optimum_is_trained_from_another_start(m
     known, new = rows_of(make_set(400, 1)), make_set(800, 2)
     given, seeds = fitting.train, []
 
-    def train(features, faults, network, training, seed):
+    def train(features, faults, network, training, seed, rows):
         """The first start of the whole has not left its beginning."""
         seeds.append(seed)
-        return given(features, faults, network, {**training, "epochs": 2} if seed == 7 else training, seed)
+        return given(features, faults, network, {**training, "epochs": 2} if seed == 7 else training, seed, rows)
 
     monkeypatch.setattr(fitting, "train", train)
     fit = fit_identifier(known, Prior(actuator), replace(RECIPES["network"], seed=7))

@@ -7,10 +7,11 @@ from emafault import closed_form
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES, sample_faults
 from emafault.identification.evaluation import FeatureSet, evaluate
-from emafault.identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_identifier
+from emafault.identification.fitting import HeldOut, Prior, Recipe, fit_identifier
 from emafault.identification.identifier import Identifier
 from emafault.identification.intervals import coverage
 from emafault.identification.posterior import FREEDOM, Knowledge, model_error, nine_forward, nominal_nine, posterior
+from emafault.identification.rows import TrainingRows
 from emafault.reconstruction.calibration import calibrate
 from emafault.reconstruction.features import Features
 

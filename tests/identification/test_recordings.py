@@ -9,9 +9,10 @@ from emafault import config
 from emafault.dataset import simulate_blocks, simulate_recording
 from emafault.errors import InputError
 from emafault.faults import FAULT_NAMES
-from emafault.identification.fitting import Prior, TrainingRows, fit_identifier
+from emafault.identification.fitting import Prior, fit_identifier
 from emafault.identification.possible import doubts
 from emafault.identification.recordings import Model, identify_recordings
+from emafault.identification.rows import TrainingRows
 from emafault.reconstruction import join_features, reconstruct
 
 FAULT = np.array([0.05, 0.0, 0.02, 0.05, 0.0, 10.0])

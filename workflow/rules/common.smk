@@ -42,6 +42,7 @@ wildcard_constraints:
     shard=r"\d+",
     worker=r"\d+",
     block=r"\d+",
+    seed=r"\d+",
 
 
 def code(script):
@@ -107,11 +108,14 @@ def shards_of_part(wildcards):
     return shards(PLAN.case(wildcards.case), wildcards.part)
 
 
-def blocks_of_part(wildcards):
+def in_blocks(files):
     """The shards of a part in the blocks that jobs reconstruct, if there is more than one."""
-    files = shards_of_part(wildcards)
     size = configuration.SHARDS_OF_A_BLOCK
     return [files[n : n + size] for n in range(0, len(files), size)] if len(files) > size else []
+
+
+def blocks_of_part(wildcards):
+    return in_blocks(shards_of_part(wildcards))
 
 
 def shards_of_block(wildcards):
@@ -149,6 +153,20 @@ def training_features(wildcards):
 
 def training_spec(wildcards):
     return configuration.network_spec(composed(wildcards), wildcards.estimator)
+
+
+def seed_spec(wildcards):
+    """What training one seed reads, which is not how many there are."""
+    return {key: value for key, value in training_spec(wildcards).items() if key != "seeds"}
+
+
+def trained_from(wildcards):
+    """What an estimator is trained from, or, of runs that several jobs have reconstructed, what is trained by seed."""
+    seeds = training_spec(wildcards).get("seeds", 1)
+    if seeds > 1 and in_blocks(shards(PLAN.case(wildcards.case), "training")):
+        folder = f"{RESULTS}/experiments/{wildcards.case}/identifiers/{wildcards.method}"
+        return {"trained": [f"{folder}/{wildcards.estimator}.{seed}" for seed in range(seeds)]}
+    return {"features": training_features(wildcards), "chosen": chosen_network(wildcards)}
 
 
 def search_spec(wildcards):

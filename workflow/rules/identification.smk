@@ -41,10 +41,30 @@ rule choose_network:
         "../scripts/choose_network.py"
 
 
-rule train_identifier:
+rule train_seed:
     input:
         features=training_features,
         chosen=chosen_network,
+    output:
+        temp(directory(f"{CASE}/identifiers/{{method}}/{{estimator}}.{{seed}}")),
+    log:
+        f"{RESULTS}/logs/{{case}}/train_{{method}}_{{estimator}}_{{seed}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/{{case}}/train_{{method}}_{{estimator}}_{{seed}}.tsv"
+    resources:
+        mem_mb=more(2000),
+        runtime=more(60),
+    params:
+        spec=seed_spec,
+        code=code("train_identifier"),
+    script:
+        "../scripts/train_identifier.py"
+
+
+# of many runs it joins what was trained seed by seed
+rule train_identifier:
+    input:
+        unpack(trained_from),
     output:
         directory(f"{CASE}/identifiers/{{method}}/{{estimator}}"),
     log:

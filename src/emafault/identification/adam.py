@@ -5,9 +5,11 @@ a network of some hundred weights costs ten products of small matrices; a framew
 several times as long to record them.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from .levenberg_marquardt import ACTIVATIONS, LearningCurve, Weights, flattened, is_no_bias, outputs, shaped
+from .levenberg_marquardt import ACTIVATIONS, Blocks, LearningCurve, Weights, flattened, is_no_bias, mean_square, shaped
 
 PASSES = 10  # over the rows an epoch, so that epochs and failed checks cost about what Levenberg-Marquardt's do
 _DECAYS, _LEAST = (0.9, 0.999), 1e-8  # of the mean and the mean square of the gradient; added to the root of the latter
@@ -29,11 +31,20 @@ def gradient(weights: Weights, activation: str, x: np.ndarray, t: np.ndarray) ->
     return flattened(parts)
 
 
+def _batches(rows: Blocks, batch: int, rng: np.random.Generator) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Every row once, in batches of a block's rows in random order."""
+    for x, t in rows:
+        order = rng.permutation(len(x))
+        for start in range(0, len(x), batch):
+            some = order[start : start + batch]
+            yield x[some], t[some]
+
+
 def train_adam(
     weights: Weights,
     activation: str,
-    train: tuple[np.ndarray, np.ndarray],
-    validation: tuple[np.ndarray, np.ndarray],
+    train: Blocks,
+    validation: Blocks,
     *,
     epochs: int,
     max_fail: int,
@@ -49,11 +60,10 @@ def train_adam(
     Parameters
     ----------
     weights : start; not changed
-    train, validation : (x, t), rows leading
+    train, validation : blocks of rows; no batch reaches from one block into another
     epochs, max_fail : each of ``PASSES`` passes over the rows; checks without a new best before stopping
     batch : rows of a step
     """
-    x, t = train
     w, like = flattened(weights), weights
     decay = 2.0 * weight_decay * is_no_bias(weights) / w.size
     mean, square, steps = np.zeros_like(w), np.zeros_like(w), 0
@@ -61,8 +71,8 @@ def train_adam(
     best, best_error, fails = w, np.inf, 0
     curve = LearningCurve(stopped="epochs")
     for epoch in range(epochs + 1):
-        for errors, (inputs, targets) in ((curve.train, train), (curve.validation, validation)):
-            errors.append(float(np.mean((outputs(shaped(w, like), activation, inputs) - targets) ** 2)))
+        for errors, rows in ((curve.train, train), (curve.validation, validation)):
+            errors.append(mean_square(shaped(w, like), activation, rows))
         if curve.validation[-1] < best_error:
             best, best_error, curve.best_epoch, fails = w, curve.validation[-1], epoch, 0
         else:
@@ -72,10 +82,8 @@ def train_adam(
             break
         share = _LAST_RATE + 0.5 * (1.0 - _LAST_RATE) * (1.0 + np.cos(np.pi * epoch / epochs))
         for _ in range(PASSES if epoch < epochs else 0):
-            order = rng.permutation(len(x))
-            for start in range(0, len(x), batch):
-                rows = order[start : start + batch]
-                g = gradient(shaped(w, like), activation, x[rows], t[rows]) + decay * w
+            for x, t in _batches(train, batch, rng):
+                g = gradient(shaped(w, like), activation, x, t) + decay * w
                 steps += 1
                 mean = _DECAYS[0] * mean + (1.0 - _DECAYS[0]) * g
                 square = _DECAYS[1] * square + (1.0 - _DECAYS[1]) * g * g

@@ -17,62 +17,15 @@ from ..errors import InputError
 from ..faults import FAULT_NAMES
 from .identifier import Identifier
 from .intervals import ConformalIntervals, worse_than_folds
-from .network import logarithmic
 from .posterior import Knowledge, nominal_nine
+from .rows import Rows, Table, TrainingRows, at_most
 from .settings import NetworkSettings, TrainingSettings
 from .training import TrainedNetwork, train
 
 ROWS_A_TERM = 10  # of the polynomial of a reconstruction's bias
-LEAST_ROWS = 10  # that an identifier is made from
 LEAST_NOISE = 1e-12  # relative variance of a feature; those without noise have a covariance with an inverse, too
 KINDS = ("cross", "split")
 STARTS = 4  # of a network, at most, until it errs no more than those of its folds
-
-
-@dataclass(frozen=True)
-class TrainingRows:
-    """Features of simulated runs in SI units, with their truth."""
-
-    features: np.ndarray  # (run, 6), (run, 8) or (run, 9), NaN where a record gave none
-    faults: np.ndarray  # (run, 6)
-    covariance: np.ndarray | None = None  # (run, 6, 6) of R and k, or (run, 9, 9); None where none is told
-    units: np.ndarray | None = None  # (run, 9) R0 (ohm), k0 (V s/rad) and L0 (H) of each run's; None: all are nominal
-
-    @property
-    def scaled(self) -> int:
-        """How many features a unit has a value of its own of."""
-        return logarithmic(self.features.shape[1])
-
-    def rows(self, index: Any) -> "TrainingRows":
-        """The same with some of the rows."""
-        covariance, units = (None if a is None else a[index] for a in (self.covariance, self.units))
-        return TrainingRows(self.features[index], self.faults[index], covariance, units)
-
-    def identified(self) -> "TrainingRows":
-        """The rows that have features, with a covariance if all of them tell one.
-
-        Raises
-        ------
-        InputError : fewer than ``LEAST_ROWS`` have
-        """
-        known = np.all(np.isfinite(self.features), axis=1)
-        rows = self if np.all(known) else self.rows(known)
-        count = len(rows.features)
-        if count < LEAST_ROWS:
-            raise InputError(
-                f"identification: {count} runs have features, at least {LEAST_ROWS} are needed to learn from"
-            )
-        told = rows.covariance is not None and np.all(np.isfinite(rows.covariance))
-        return rows if told else replace(rows, covariance=None)
-
-    def of_nominal(self, actuator: ActuatorParameters) -> "TrainingRows":
-        """As the nominal unit would have given them: features and covariance are scaled by what each unit is off."""
-        features, covariance = self.features.copy(), self.covariance
-        if self.units is not None:
-            scale = nominal_nine(actuator)[: self.scaled] / self.units[:, : self.scaled]
-            features[:, : self.scaled] *= scale
-            covariance = None if covariance is None else covariance * scale[:, :, None] * scale[:, None, :]
-        return TrainingRows(features, self.faults, covariance)
 
 
 @dataclass(frozen=True)
@@ -94,18 +47,18 @@ class Recipe:
     training: Mapping[str, Any] | TrainingSettings | None = None
     seed: int = 0
 
-    def train(self, lesson: "Lesson", rows: Any = slice(None), start: int = 0) -> TrainedNetwork:
-        """A network that learnt some rows; each start has a seed of its own."""
+    def train(self, lesson: "Lesson", rows: np.ndarray | None = None, start: int = 0) -> TrainedNetwork:
+        """A network that learnt some rows, or all; each start has a seed of its own."""
         seed = self.seed + 1000 * start
-        return train(lesson.learnt[rows], lesson.shown.faults[rows], self.network, self.training, seed)
+        return train(lesson.learnt, lesson.shown.faults, self.network, self.training, seed, rows)
 
 
 @dataclass(frozen=True)
 class Lesson:
     """What a network learns from, and the same rows as it is shown them later, on which it is judged."""
 
-    learnt: np.ndarray  # (run, feature)
-    shown: TrainingRows
+    learnt: Table  # (run, feature)
+    shown: Rows
 
     def judged(
         self, identifier: Identifier, trained: TrainedNetwork, rows: np.ndarray
@@ -121,7 +74,7 @@ class HeldOut:
     """Which rows calibrate a network's intervals.
 
     ``cross``: all of them, by ``folds`` further networks, each judged on the rows that it has not learnt; ``split``:
-    the test rows of the network itself.
+    the test rows of the network itself. Of many rows ``rows.MOST_AT_ONCE``, drawn at random, are judged.
     """
 
     kind: str = "cross"
@@ -141,13 +94,13 @@ class HeldOut:
         """
         trained = recipe.train(lesson)
         if self.kind == "split":
-            own = lesson.judged(identifier, trained, trained.test_rows)
+            own = lesson.judged(identifier, trained, at_most(trained.test_rows, recipe.seed))
             return trained, ConformalIntervals.calibrate(*own, "split, test rows")
         intervals, of_folds = self.by_folds(identifier, lesson, recipe)
         best, worse = trained, np.full(len(FAULT_NAMES), np.inf)
         for start in range(STARTS):
             tried = trained if not start else recipe.train(lesson, start=self.folds + start)
-            unlearnt = np.concatenate([tried.validation_rows, tried.test_rows])
+            unlearnt = at_most(np.concatenate([tried.validation_rows, tried.test_rows]), recipe.seed)
             ratio = worse_than_folds(lesson.judged(identifier, tried, unlearnt)[0], of_folds)
             if np.prod(ratio) < np.prod(worse):
                 best, worse = tried, ratio
@@ -162,7 +115,7 @@ class HeldOut:
         parts = []
         for fold, left_out in enumerate(np.array_split(order, self.folds), start=1):
             of_fold = recipe.train(lesson, np.setdiff1d(every, left_out), fold)
-            parts.append(lesson.judged(identifier, of_fold, left_out))
+            parts.append(lesson.judged(identifier, of_fold, at_most(left_out, recipe.seed, self.folds)))
         residuals = np.concatenate([error for error, _ in parts])
         told = [variance for _, variance in parts if variance is not None]
         variance = np.concatenate(told) if told else None
@@ -177,9 +130,7 @@ class Fit:
     trained: TrainedNetwork | None = None
 
 
-def fit_identifier(
-    rows: TrainingRows, prior: Prior, recipe: Recipe | None = None, held_out: HeldOut | None = None
-) -> Fit:
+def fit_identifier(rows: Rows, prior: Prior, recipe: Recipe | None = None, held_out: HeldOut | None = None) -> Fit:
     """The network of a recipe, or without one the closed form, with intervals.
 
     Rows without features are left out. Intervals are calibrated on rows scaled to the nominal unit: what a unit is off
@@ -195,14 +146,14 @@ def fit_identifier(
     return fit_network(rows, prior, recipe, held_out or HeldOut())
 
 
-def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
+def fit_closed_form(rows: Rows, prior: Prior) -> Identifier:
     """The closed form; of nine features its intervals are the posterior's, of others they are calibrated on all rows.
 
     A biased reconstruction has its bias in a unit's healthy recordings, too: the closed form, which does not learn it,
     has other intervals with them than without.
     """
-    nominal = rows.of_nominal(prior.actuator)
-    identifier = _untold(rows, nominal, prior)
+    nominal = rows.some().of_nominal(prior.actuator).some()
+    identifier = _untold(rows.extremes(), nominal, prior)
     if rows.features.shape[1] == 9:
         return replace(identifier, intervals=ConformalIntervals.gaussian("posterior of nine features"))
     error = identifier.at_nominal(nominal.features, nominal.covariance) - nominal.faults
@@ -217,7 +168,7 @@ def fit_closed_form(rows: TrainingRows, prior: Prior) -> Identifier:
     return replace(identifier, intervals=found, intervals_of_units=of_units)
 
 
-def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: HeldOut) -> Fit:
+def fit_network(rows: Rows, prior: Prior, recipe: Recipe, held_out: HeldOut) -> Fit:
     """A network; of nine features that learns from units that differ, a second one for units with a healthy recording.
 
     For how nine features are best weighed depends on what of the unit is known. Nine features leave more than a fault,
@@ -225,12 +176,13 @@ def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: Held
     """
     nominal = rows.of_nominal(prior.actuator)
     lesson = Lesson(rows.features if rows.scaled == 9 else nominal.features, nominal)
-    blank = _untold(rows, nominal, prior)
+    some = nominal.some()
+    blank = _untold(rows.extremes(), some, prior)
     trained, intervals = held_out.calibrated(blank, lesson, recipe)
     identifier = replace(
         blank,
         network=trained.network,
-        healthy=HealthyPoint.of(nominal, prior).of_nominal(prior.actuator),
+        healthy=HealthyPoint.of(some, prior).of_nominal(prior.actuator),
         intervals=intervals,
     )
     if rows.scaled == 9 and rows.units is not None and nominal.covariance is not None:
@@ -241,26 +193,33 @@ def fit_network(rows: TrainingRows, prior: Prior, recipe: Recipe, held_out: Held
     return Fit(identifier, trained)
 
 
-def beside_a_healthy_recording(nominal: TrainingRows, seed: int) -> TrainingRows:
+def beside_a_healthy_recording(nominal: Rows, seed: int) -> Rows:
     """Rows as a healthy recording with the noise of each row's own leaves the unit known."""
-    spread = nominal.covariance
-    assert spread is not None
-    draws = np.random.default_rng([seed, 40]).normal(size=nominal.features.shape)
-    size = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
-    alike = spread / (size[:, :, None] * size[:, None, :]) + LEAST_NOISE * np.eye(9)
-    features = nominal.features + size * (np.linalg.cholesky(alike) @ draws[:, :, None])[:, :, 0]
-    return TrainingRows(features, nominal.faults, 2.0 * spread)
+    rng = np.random.default_rng([seed, 40])
+
+    def noisy(rows: TrainingRows) -> TrainingRows:
+        spread = rows.covariance
+        assert spread is not None
+        draws = rng.normal(size=rows.features.shape)
+        size = np.sqrt(np.diagonal(spread, axis1=1, axis2=2))
+        alike = spread / (size[:, :, None] * size[:, None, :]) + LEAST_NOISE * np.eye(9)
+        features = rows.features + size * (np.linalg.cholesky(alike) @ draws[:, :, None])[:, :, 0]
+        return TrainingRows(features, rows.faults, 2.0 * spread)
+
+    return nominal.each(noisy)
 
 
-def _untold(rows: TrainingRows, nominal: TrainingRows, prior: Prior) -> Identifier:
-    """The closed form with all but its intervals; where no covariance is told, with that of the rows."""
+def _untold(learnt: tuple[np.ndarray, np.ndarray], nominal: TrainingRows, prior: Prior) -> Identifier:
+    """The closed form with all but its intervals; where no covariance is told, with that of the rows.
+
+    ``learnt`` : least and greatest (feature,) of the rows; ``nominal`` : rows in memory
+    """
     none = ConformalIntervals("", np.empty((0, 6)), np.zeros(6), np.zeros(6))
     noise = None
-    if rows.covariance is None and rows.scaled == 6:
+    if nominal.covariance is None and nominal.scaled == 6:
         noise = HealthyPoint.of(nominal, prior).covariance + LEAST_NOISE * np.eye(6)
-    low, high = rows.features.min(axis=0), rows.features.max(axis=0)
     return Identifier(
-        prior.actuator, prior.alpha_m, prior.known.lag, none, None, low, high, known=prior.known, noise=noise
+        prior.actuator, prior.alpha_m, prior.known.lag, none, None, *learnt, known=prior.known, noise=noise
     )
 
 

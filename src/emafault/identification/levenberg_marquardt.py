@@ -5,14 +5,12 @@ a_{l-1}[n, i] with delta the backpropagated derivative of output o and a the lay
 bias), so that blocks of J'J are contractions over n of two small products and the Jacobian itself is never formed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-
-BLOCK = 2000  # rows whose derivatives are in memory at a time
 
 #: activation of the pre-activation, and its derivative by it as a function of the activation
 ACTIVATIONS: dict[str, tuple[Callable, Callable]] = {
@@ -22,6 +20,8 @@ ACTIVATIONS: dict[str, tuple[Callable, Callable]] = {
 }
 #: one matrix a layer, (output, input + 1), the bias in the last column
 Weights = list[np.ndarray]
+#: inputs (row, feature) and targets (row, output), a block of rows at a time, as often as they are asked for
+Blocks = Iterable[tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass
@@ -86,14 +86,28 @@ def jacobian(weights: Weights, activation: str, x: np.ndarray) -> np.ndarray:
     return np.concatenate(blocks, axis=-1)
 
 
-def normal_equations(weights: Weights, activation: str, x: np.ndarray, t: np.ndarray):
-    """J'J (weight, weight), J'e (weight,) and the sum of squares of e = y - t, without forming J, in blocks of rows."""
-    blocks = [slice(start, start + BLOCK) for start in range(0, len(x), BLOCK)]
-    JJ, Je, sse = _normal_equations(weights, activation, x[blocks[0]], t[blocks[0]])
-    for rows in blocks[1:]:
-        more = _normal_equations(weights, activation, x[rows], t[rows])
-        JJ, Je, sse = JJ + more[0], Je + more[1], sse + more[2]
-    return JJ, Je, sse
+def mean_square(weights: Weights, activation: str, rows: Blocks) -> float:
+    """Mean of e^2 over rows and outputs."""
+    total, count = 0.0, 0
+    for x, t in rows:
+        total += float(np.sum((outputs(weights, activation, x) - t) ** 2))
+        count += t.size
+    return total / count
+
+
+def normal_equations(weights: Weights, activation: str, rows: Blocks) -> tuple[np.ndarray, np.ndarray, float, int]:
+    """J'J (weight, weight), J'e (weight,), the sum of squares of e = y - t and how many e there are.
+
+    J is never formed, and the derivatives of one block are in memory at a time.
+    """
+    size = sum(W.size for W in weights)
+    JJ, Je, sse, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
+    for x, t in rows:
+        more = _normal_equations(weights, activation, x, t)
+        JJ += more[0]
+        Je += more[1]
+        sse, count = sse + more[2], count + t.size
+    return JJ, Je, sse, count
 
 
 def _normal_equations(weights: Weights, activation: str, x: np.ndarray, t: np.ndarray):
@@ -124,8 +138,8 @@ def _normal_equations(weights: Weights, activation: str, x: np.ndarray, t: np.nd
 def train_lm(
     weights: Weights,
     activation: str,
-    train: tuple[np.ndarray, np.ndarray],
-    validation: tuple[np.ndarray, np.ndarray] | None = None,
+    train: Blocks,
+    validation: Blocks | None = None,
     *,
     epochs: int = 1000,
     max_fail: int = 10,
@@ -141,7 +155,7 @@ def train_lm(
     Parameters
     ----------
     weights : start; not changed
-    train, validation : (x, t), rows leading; without validation rows the last weights are returned
+    train, validation : blocks of rows; without validation rows the last weights are returned
     max_fail : validation checks without a new best before stopping
     mu, mu_inc, mu_dec, mu_max : damping of trainlm, relative to J'J over the number of residuals
 
@@ -149,17 +163,16 @@ def train_lm(
     -------
     the weights and the learning curve
     """
-    x, t = train
-    count, w = t.size, flattened(weights)
+    w = flattened(weights)
 
-    def error(w: np.ndarray, rows: tuple[np.ndarray, np.ndarray]) -> float:
-        return float(np.mean((outputs(shaped(w, weights), activation, rows[0]) - rows[1]) ** 2))
+    def error(w: np.ndarray, rows: Blocks) -> float:
+        return mean_square(shaped(w, weights), activation, rows)
 
     decay = weight_decay * is_no_bias(weights) / w.size
     best, best_error, fails = w, np.inf, 0
     curve = LearningCurve(stopped="epochs")
     for epoch in range(epochs + 1):
-        JJ, Je, sse = normal_equations(shaped(w, weights), activation, x, t)
+        JJ, Je, sse, count = normal_equations(shaped(w, weights), activation, train)
         JJ /= count
         gradient = Je / count + decay * w
         JJ[np.diag_indices_from(JJ)] += decay

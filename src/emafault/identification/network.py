@@ -1,5 +1,6 @@
 """The trained network with its scaling: from features in SI units to faults in SI units."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -23,15 +24,22 @@ class Scaler:
     fault_scale: np.ndarray
 
     @classmethod
-    def fit(cls, coordinates: str, features: np.ndarray, faults: np.ndarray) -> "Scaler":
-        """Mean and standard deviation of the training rows; a constant column keeps scale 1."""
-        z = coordinates_of(coordinates, features)
+    def fit(cls, coordinates: str, blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> "Scaler":
+        """Mean and standard deviation of features and faults of the training rows; a constant column keeps scale 1.
 
-        def spread(x: np.ndarray) -> np.ndarray:
-            deviation = x.std(axis=0)
-            return np.where(deviation > 1e-12, deviation, 1.0)
-
-        return cls(coordinates, z.mean(axis=0), spread(z), faults.mean(axis=0), spread(faults))
+        ``blocks`` : features (row, feature) and faults (row, 6), block by block; they are gone through twice
+        """
+        totals, squares = [np.zeros(1), np.zeros(1)], [np.zeros(1), np.zeros(1)]
+        count = 0
+        for block in _with_coordinates(coordinates, blocks):
+            totals = [total + np.sum(x, axis=0) for total, x in zip(totals, block)]
+            count += len(block[0])
+        means = [total / count for total in totals]
+        for block in _with_coordinates(coordinates, blocks):
+            squares = [s + np.sum((x - mean) ** 2, axis=0) for s, x, mean in zip(squares, block, means)]
+        deviations = [np.sqrt(square / count) for square in squares]
+        scales = [np.where(deviation > 1e-12, deviation, 1.0) for deviation in deviations]
+        return cls(coordinates, means[0], scales[0], means[1], scales[1])
 
     def features(self, x: np.ndarray) -> np.ndarray:
         """Standardised coordinates (run, feature) of features in SI units."""
@@ -46,8 +54,14 @@ class Scaler:
         return t * self.fault_scale + self.fault_mean
 
 
-def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
+def _with_coordinates(coordinates: str, blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[list[np.ndarray]]:
+    return ([coordinates_of(coordinates, features), faults] for features, faults in blocks)
+
+
+def coordinates_of(coordinates: str, features: np.ndarray, runs: np.ndarray | None = None) -> np.ndarray:
     """The features as they are, or with R, k and L, which are all of them but a measured xi, in logarithms.
+
+    ``runs`` : their numbers, for the message; None counts from 0
 
     Raises
     ------
@@ -59,9 +73,8 @@ def coordinates_of(coordinates: str, features: np.ndarray) -> np.ndarray:
     if np.any(np.real(features[:, :logs]) <= 0.0):
         row, column = np.argwhere(np.real(features[:, :logs]) <= 0.0)[0]
         name = [f"{quantity}_{phase}" for quantity in "RkL" for phase in "abc"][column]
-        raise InputError(
-            f"features: {name} of run {row} is {np.real(features[row, column]):.4g}, accepted are values above 0"
-        )
+        run, value = row if runs is None else runs[row], np.real(features[row, column])
+        raise InputError(f"features: {name} of run {run} is {value:.4g}, accepted are values above 0")
     return np.concatenate([np.log(features[:, :logs]), features[:, logs:]], axis=1)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from ..databases import SQLITE, locked, with_driver, without_password
 from ..errors import InputError
 from ..processes import still_there, this_process
+from .rows import Table, at_most, in_blocks
 from .settings import NetworkSettings, TrainingSettings
 from .training import train
 
@@ -110,12 +111,13 @@ def _suggest(trial, key: str, spec: Any) -> Any:
     return trial.suggest_float(key, low, high, step=step, log=log)
 
 
-def study_name(settings: SearchSettings, features: np.ndarray, faults: np.ndarray, width: np.ndarray) -> str:
+def study_name(settings: SearchSettings, features: Table, faults: Table, width: np.ndarray) -> str:
     """Name of the study: a digest of everything that a trial's result depends on, so not of the number of trials."""
     plain = {key: value for key, value in asdict(settings).items() if key not in ("trials", "sampler")}
     digest = hashlib.sha256(json.dumps(plain, sort_keys=True, default=str).encode())
-    for array in (features, faults, width):
-        digest.update(np.ascontiguousarray(array, float).tobytes())
+    for table in (features, faults, width):
+        for block in in_blocks(len(table)):
+            digest.update(np.ascontiguousarray(table[block], float).tobytes())
     return f"network-{digest.hexdigest()[:16]}"
 
 
@@ -275,14 +277,14 @@ def _beating(trial) -> Iterator[None]:
 
 
 def trial_error(
-    settings: SearchSettings, values: Mapping[str, Any], features: np.ndarray, faults: np.ndarray, width: np.ndarray
+    settings: SearchSettings, values: Mapping[str, Any], features: Table, faults: Table, width: np.ndarray
 ) -> tuple[float, int]:
     """Held-out error over range, of rows neither trained on nor used for stopping, and the number of weights."""
     network, training = settings.settings(values)
     shares = []
     for repeat in range(settings.repeats):
         model = train(features, faults, network, training, seed=settings.seed + 7919 * repeat)
-        rows = model.test_rows if len(model.test_rows) else model.validation_rows
+        rows = at_most(model.test_rows if len(model.test_rows) else model.validation_rows, settings.seed)
         residual = np.abs(model.network.predict(features[rows]) - faults[rows])
         used = width > 0.0
         shares.append(float(np.mean(residual[:, used] / width[used])))
@@ -292,8 +294,8 @@ def trial_error(
 def run_worker(
     storage: str | Path,
     settings: SearchSettings,
-    features: np.ndarray,
-    faults: np.ndarray,
+    features: Table,
+    faults: Table,
     width: np.ndarray,
     worker: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -365,7 +367,7 @@ def _sampler(settings: SearchSettings, worker: int, complete: int, repeated: int
 
 
 def finished(
-    storage: str | Path, settings: SearchSettings, features: np.ndarray, faults: np.ndarray, width: np.ndarray
+    storage: str | Path, settings: SearchSettings, features: Table, faults: Table, width: np.ndarray
 ) -> list[Trial]:
     """Finished trials in the order of their numbers, none of them marked.
 

@@ -1,5 +1,6 @@
 """Features of a part of a dataset: reconstructed from its shards, kept in one netCDF file."""
 
+import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import BLOCK, count_runs, read_blocks
 from ..errors import InputError
 from ..faults import FAULT_NAMES
+from ..identification.rows import in_blocks
 from ..io.atomic import replace_atomically
 from ..io.recording import PHASES
 from ..places import file_at
@@ -121,20 +123,13 @@ def join_features(paths: Sequence[str | Path], output: str | Path) -> None:
                 with netCDF4.Dataset(file_at(path)) as part:
                     part.set_auto_mask(False)
                     if not first:
-                        _create_like(joined, part, sum(_runs_in(p) for p in paths))
+                        _create_like(joined, part, sum(runs_in(p) for p in paths))
                     for name, variable in part.variables.items():
                         if variable.dimensions[0] == "run":
                             joined[name][first : first + len(variable)] = variable[:]
                     first += len(part.dimensions["run"])
 
     replace_atomically(Path(output), write)
-
-
-def _runs_in(path: str | Path) -> int:
-    import netCDF4
-
-    with netCDF4.Dataset(path) as file:
-        return len(file.dimensions["run"])
 
 
 def _create_like(joined, part, runs: int) -> None:
@@ -189,6 +184,35 @@ def read_features(path: str | Path) -> FeatureTable:
     ------
     InputError : no such file, or not one of these
     """
+    with _opened(path) as file:
+        return _read(file, slice(None))
+
+
+def read_features_in_blocks(path: str | Path) -> Iterator[FeatureTable]:
+    """The same, a block of runs at a time.
+
+    Raises
+    ------
+    InputError : no such file, or not one of these
+    """
+    with _opened(path) as file:
+        for rows in in_blocks(len(file.dimensions["run"])):
+            yield _read(file, rows)
+
+
+def runs_in(path: str | Path) -> int:
+    """How many runs a file of features holds.
+
+    Raises
+    ------
+    InputError : no such file, or not one of these
+    """
+    with _opened(path) as file:
+        return len(file.dimensions["run"])
+
+
+@contextlib.contextmanager
+def _opened(path: str | Path) -> Iterator[Any]:
     import netCDF4
 
     if not Path(path).is_file():
@@ -196,11 +220,17 @@ def read_features(path: str | Path) -> FeatureTable:
     try:
         with netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
-            data = file.variables
-            kept = [name for name in ("xi", "nine_covariance") if f"extra_{name}" in data]
-            extras = {name: data[f"extra_{name}"][:] for name in kept}
-            R, k, L, offset, covariance = (data[n][:] for n in (*_UNITS, "covariance"))
-            features = Features(R, k, L, offset, covariance, extras)
-            return FeatureTable(features, data["fault"][:], data["ambient_temperature"][:])
+            yield file
     except (OSError, RuntimeError, KeyError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: not a readable table of features ({error})") from error
+
+
+def _read(file, rows: slice) -> FeatureTable:
+    data = file.variables
+    kept = [name for name in ("xi", "nine_covariance") if f"extra_{name}" in data]
+    extras = {name: data[f"extra_{name}"][rows] for name in kept}
+    R, k, L, offset, covariance = (data[n][rows] for n in (*_UNITS, "covariance"))
+    features = Features(R, k, L, offset, covariance, extras)
+    return FeatureTable(features, data["fault"][rows], data["ambient_temperature"][rows])

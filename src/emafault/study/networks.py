@@ -1,7 +1,9 @@
 """Estimators of a study: the closed form, the configured network over several seeds, the searched one, its export."""
 
 import json
-from collections.abc import Mapping, Sequence
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,13 +14,14 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import unit_parameters
 from ..errors import InputError
 from ..identification.evaluation import fault_range
-from ..identification.fitting import Prior, Recipe, TrainingRows, fit_identifier
+from ..identification.fitting import Prior, Recipe, fit_identifier
 from ..identification.posterior import Knowledge
+from ..identification.rows import MOST_AT_ONCE, Rows, TrainingRows, store
 from ..identification.search import SearchSettings, Trial, choose, finished, ranked, run_worker
 from ..io.atomic import whole_folder, write_text
 from ..plain import read_json
 from ..progress import progress, say
-from .features import read_features
+from .features import FeatureTable, read_features, read_features_in_blocks, runs_in
 
 HISTORY = "history.json"
 OFF = 0.01  # relative, of the unit for which an exported network is compared
@@ -50,7 +53,12 @@ def seed_folder(folder: str | Path, seed: int) -> Path:
 
 
 def train_identifier(
-    estimator: str, features: str, spec: Mapping[str, Any], history: str | Path, chosen: str | None = None
+    estimator: str,
+    features: str,
+    spec: Mapping[str, Any],
+    history: str | Path,
+    chosen: str | None = None,
+    seed: int | None = None,
 ) -> None:
     """Fit one estimator on one method's features, networks from several seeds, and save them beside ``history``.
 
@@ -58,32 +66,75 @@ def train_identifier(
     ----------
     estimator : ``closed_form``, ``network`` (as configured) or ``searched`` (as ``chosen`` by the search)
     history : learning curves of every seed; its folder is written whole, and what was in it is removed
+    seed : the only one to train, of many runs; None for the ``seeds`` of the settings
 
     Raises
     ------
     InputError : features that cannot be used, or a folder that cannot be written
     """
-    whole = read_features(features)
-    table, settings = whole.identified(), dict(spec)
-    # of units that are all alike there is nothing to take out
-    units = unit_parameters(spec["units"])[whole.known] if "units" in spec else None
+    settings = dict(spec)
     if chosen:
         settings |= {key: read_json(chosen, "network", "training")[key] for key in ("network", "training")}
-    rows = TrainingRows(table.inputs, table.faults, table.covariance, units)
     prior = Prior(ActuatorParameters(**spec["actuator"]), spec["magnet_coefficient"], Knowledge(**spec["known"]))
     folder, curves = Path(history).parent, []
     learns = estimator != "closed_form"
-    seeds = range(settings["seeds"] if learns else 1)
-    with whole_folder(folder) as part:
-        for seed in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
-            recipe = Recipe(settings["network"], settings["training"], seed) if learns else None
+    seeds = [seed] if seed is not None else range(settings["seeds"] if learns else 1)
+    with tempfile.TemporaryDirectory() as scratch, whole_folder(folder) as part:
+        rows = learning_rows(features, Path(scratch), spec.get("units")).identified()
+        for number in progress(seeds, f"train {folder.parent.name} {estimator}", len(seeds)):
+            recipe = Recipe(settings["network"], settings["training"], number) if learns else None
             fit = fit_identifier(rows, prior, recipe)
-            fit.identifier.save(seed_folder(part, seed))
+            fit.identifier.save(seed_folder(part, number))
             if fit.trained:
                 curves.append([asdict(curve) for curve in fit.trained.curves])
         plain = {key: settings.get(key) for key in ("network", "training")}
-        told = {"estimator": estimator, "seeds": len(seeds), "rows": len(table.faults), "curves": curves, **plain}
+        told = {"estimator": estimator, "seeds": len(seeds), "rows": len(rows.faults), "curves": curves, **plain}
         write_json(part / Path(history).name, told)
+
+
+def join_seeds(folders: Sequence[str], history: str | Path) -> None:
+    """Save the networks of several seeds, trained one by one, beside ``history`` as if trained together.
+
+    Raises
+    ------
+    InputError : a folder that cannot be read or written
+    """
+    parts = [read_json(f"{folder}/{HISTORY}", "curves") for folder in folders]
+    with whole_folder(Path(history).parent) as whole:
+        for seed, folder in enumerate(folders):
+            shutil.copytree(seed_folder(folder, seed), seed_folder(whole, seed))
+        curves = [curve for part in parts for curve in part["curves"]]
+        write_json(whole / Path(history).name, {**parts[0], "seeds": len(parts), "curves": curves})
+
+
+def learning_rows(features: str, scratch: Path, units: Mapping[str, Any] | None = None) -> Rows:
+    """Rows of a table of features, with what each run's unit is, where units differ; many of them in files.
+
+    Parameters
+    ----------
+    scratch : folder for the files
+    units : the sub-tree ``config.dataset_spec``; None where all units are alike, and nothing is to be taken out
+
+    Raises
+    ------
+    InputError : no readable table of features
+    """
+    own = None if units is None else unit_parameters(units)
+
+    def rows_of(table: FeatureTable, first: int) -> TrainingRows:
+        unit = None if own is None else own[first : first + len(table.faults)]
+        return TrainingRows(table.inputs, table.faults, table.features.inputs_covariance, unit)
+
+    if runs_in(features) <= MOST_AT_ONCE:
+        return rows_of(read_features(features), 0)
+
+    def each() -> Iterator[TrainingRows]:
+        first = 0
+        for table in read_features_in_blocks(features):
+            yield rows_of(table, first)
+            first += len(table.faults)
+
+    return store(scratch, each())
 
 
 def search_settings(spec: Mapping[str, Any]) -> SearchSettings:
@@ -104,7 +155,6 @@ def search_network(features: str, spec: Mapping[str, Any], storage: str, worker:
     ------
     InputError : an unusable storage or space
     """
-    table = read_features(features).identified()
     last = [-1]
 
     def tell(done: int, asked: int) -> None:
@@ -112,10 +162,12 @@ def search_network(features: str, spec: Mapping[str, Any], storage: str, worker:
             last[0] = done
             say(f"search: {done} of {asked} trials")
 
-    data = table.inputs, table.faults, width_of(spec["faults"])
     settings = search_settings(spec)
-    ran = run_worker(storage, settings, *data, worker, progress=tell)
-    trials = [asdict(trial) for trial in finished(storage, settings, *data)]
+    with tempfile.TemporaryDirectory() as scratch:
+        rows = learning_rows(features, Path(scratch)).identified()
+        data = rows.features, rows.faults, width_of(spec["faults"])
+        ran = run_worker(storage, settings, *data, worker, progress=tell)
+        trials = [asdict(trial) for trial in finished(storage, settings, *data)]
     write_json(output, {"worker": worker, "ran": ran, "trials": trials})
 
 

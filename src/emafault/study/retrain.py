@@ -16,7 +16,8 @@ from ..dataset import as_batch, sample_runs, simulate_and_measure
 from ..equations.carried import entries
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..identification.fitting import HeldOut, Prior, Recipe, TrainingRows, fit_network
+from ..identification.fitting import HeldOut, Prior, Recipe, fit_network
+from ..identification.rows import TrainingRows
 from ..io.bench import read_bench
 from ..io.recording import Recording
 from ..plain import read_json
