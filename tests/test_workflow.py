@@ -163,6 +163,11 @@ def test_an_override_reruns_only_what_reads_it(house, override, must, must_not):
         assert planned["reconstruct_features"] == 2
 
 
+def test_of_many_runs_each_seed_is_a_job(house):
+    planned = _planned(house, *SMOKE, "overrides=sampling.shards=6")
+    assert planned["train_seed"] == 8 and planned["train_identifier"] == 7  # two seeds of three networks and one more
+
+
 def test_another_experiment_stands_beside_and_shares_what_is_equal(house):
     planned = _planned(house, "--config", "experiment=smoke", "overrides=name=mine dataset=smoke training.epochs=50")
     assert "simulate_shard" not in planned and planned["train_identifier"] == 7

@@ -4,6 +4,7 @@ A file of rows is read anew for each block and let go: a table of a million runs
 thousand, but for the numbers of its rows.
 """
 
+import math
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -32,8 +33,23 @@ class Stored:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, rows: Any) -> np.ndarray:
-        return np.array(np.memmap(self.path, float, "r", shape=self.shape)[rows])
+    def __getitem__(self, rows: slice | np.ndarray) -> np.ndarray:
+        """(row, ...) of consecutive rows, or of the numbers of rows, whatever their order."""
+        if isinstance(rows, slice):
+            start, stop, _ = rows.indices(len(self))
+            return self._read(start, stop)
+        out = np.empty((len(rows), *self.shape[1:]))
+        order = np.argsort(rows, kind="stable")
+        blocks, firsts = np.unique(rows[order] // BLOCK, return_index=True)
+        for block, here in zip(blocks.tolist(), np.split(order, firsts[1:])):
+            start = BLOCK * block
+            out[here] = self._read(start, min(start + BLOCK, len(self)))[rows[here] - start]
+        return out
+
+    def _read(self, start: int, stop: int) -> np.ndarray:
+        size = math.prod(self.shape[1:])
+        table = np.fromfile(self.path, float, (stop - start) * size, offset=8 * start * size)
+        return table.reshape(stop - start, *self.shape[1:])
 
 
 #: rows in memory or in a file; both give an array for a slice or for numbers of rows
