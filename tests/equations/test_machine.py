@@ -50,16 +50,28 @@ def test_a_shape_in_the_library_may_have_other_harmonics_and_rounded_corners():
         assert set(beside) <= set(block.columns) if seen else not set(beside) & set(block.columns)
 
 
-def test_corners_are_rounded_as_by_an_average_over_the_ramp():
+@pytest.mark.parametrize("ramp", [np.pi / 6.0, 0.3])
+def test_corners_are_rounded_as_by_an_average_over_the_ramp(ramp):
     x = np.linspace(-7.0, 7.0, 40001)
 
     def swept(at):
-        return trapezoid_swept(at, waveform.RAMP)[0]
+        return trapezoid_swept(at, ramp)[0]
 
-    half = 0.5 * waveform.RAMP
-    average = np.mean([swept(x + s) for s in np.linspace(-half, half, 401)], axis=0)
-    column = waveform.swept(Point({waveform.CORNERS: 0.0}, "a.nc"), x[:-1], x[1:]).slopes[waveform.CORNERS]
+    average = np.mean([swept(x + s) for s in np.linspace(-0.5 * ramp, 0.5 * ramp, 401)], axis=0)
+    column = waveform.swept(Point({waveform.CORNERS: 0.0}, "a.nc"), x[:-1], x[1:], ramp).slopes[waveform.CORNERS]
     np.testing.assert_allclose(column, np.diff(average - swept(x)), atol=1e-6)
+
+
+def test_corners_are_rounded_over_the_ramp_of_the_point():
+    machine = machine_of({"a.nc": recorded()})
+    wide = {n: p.off for n, p in machine.parameters.items()} | {"back_emf_shape.width": 140.0}
+    machine.prepare("a.nc", wide)
+    rec = machine.recordings["a.nc"]
+    state = State(rec, Point(wide, "a.nc", (waveform.CORNERS,)))
+    ramp, poles = np.deg2rad(20.0), rec.actuator.pole_pairs
+    before, after = (waveform.rounding(poles * a - rec.axis[0], ramp) for a in (rec.before, rec.angle))
+    expected = (after - before) / (poles * rec.interval)
+    np.testing.assert_allclose(state.swept[0].slopes[waveform.CORNERS], expected, atol=1e-12)
 
 
 def test_the_form_of_an_effect_may_differ_along_every_coordinate(nominal):

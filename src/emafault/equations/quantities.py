@@ -82,7 +82,7 @@ def _mean_shape(state: State, low, high, shift, ramp, joined: bool = False) -> D
     total = shift.through(F2 - F1, f1 - f2) + ramp.through(0.0, dr2 - dr1)
     for m in with_hook("harmonics"):
         total = total + m.harmonics(state.p.of(effect_name(m)), low - off, high - off)
-    return total + waveform.swept(state.p, low - off, high - off)
+    return total + waveform.swept(state.p, low - off, high - off, r)
 
 
 def _before(x: np.ndarray) -> np.ndarray:

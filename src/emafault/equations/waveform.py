@@ -13,27 +13,31 @@ from .point import Point
 UNIT = "~harmonics_emf"
 NAMES = {n: f"emf.{name}" for n, name in zip(ORDERS, OF_SHAPE["harmonics"], strict=True)}
 CORNERS = "emf.corners"  # of a trapezoid that is averaged over the length of its own ramp, as a share of that
-RAMP = np.pi / 6.0  # electrical rad, of the nominal trapezoid
-#: where its slope changes (electrical rad), and which way
-CHANGES = ((RAMP, -1.0), (np.pi - RAMP, -1.0), (np.pi + RAMP, 1.0), (2.0 * np.pi - RAMP, 1.0))
+LEAST_RAMP = 1e-6  # electrical rad; corners nearer to each other than so are one
 
 
-def swept(p: Point, low: np.ndarray, high: np.ndarray) -> Dual | float:
-    """Integral over the electrical angle from ``low`` to ``high`` (rad) of what is added to the trapezoid."""
+def swept(p: Point, low: np.ndarray, high: np.ndarray, ramp: float) -> Dual | float:
+    """Integral over the electrical angle from ``low`` to ``high`` (rad) of what is added to the trapezoid.
+
+    ``ramp`` : electrical angle over which the trapezoid rises from 0 to 1 (rad)
+    """
     total = integral({n: p(name) for n, name in NAMES.items()}, low, high)
     corners = p(CORNERS)
-    return total + corners * (_rounding(high) - _rounding(low)) if corners.slopes or corners.value else total
+    if not (corners.slopes or corners.value):
+        return total
+    return total + corners * (rounding(high, ramp) - rounding(low, ramp))
 
 
-def _rounding(angle: np.ndarray) -> np.ndarray:
+def rounding(angle: np.ndarray, ramp: float) -> np.ndarray:
     """Integral, over a whole turn nothing, of what the average over a ramp's length changes about the corners: there it
     is (h - |u|)^2 / (4 h ramp) in the direction of the change, u from the corner, up to half the length h."""
-    x, h = np.mod(angle, 2.0 * np.pi), 0.5 * RAMP
-    total = np.zeros_like(x)
-    for at, sign in CHANGES:
+    x, ramp = np.mod(angle, 2.0 * np.pi), max(ramp, LEAST_RAMP)
+    h, total = 0.5 * ramp, np.zeros_like(x)
+    # where the slope of the trapezoid changes, and which way
+    for at, sign in ((ramp, -1.0), (np.pi - ramp, -1.0), (np.pi + ramp, 1.0), (2.0 * np.pi - ramp, 1.0)):
         u = np.clip(x - at, -h, h)
         total += sign * np.where(u < 0.0, (h + u) ** 3, 2.0 * h**3 - (h - u) ** 3)
-    return total / (12.0 * h * RAMP)
+    return total / (12.0 * h * ramp)
 
 
 def integral(sizes: Mapping[int, Dual], low: np.ndarray, high: np.ndarray) -> Dual | float:
