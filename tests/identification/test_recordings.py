@@ -52,6 +52,18 @@ def test_voltages_that_do_not_fit_their_equation_are_told_and_widen_the_interval
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_a_winding_that_warms_is_told_and_widens_the_intervals(models, method):
+    reversal = ["command=reversal", "command.amplitude=0.22", "command.speed=0.66"]
+    cold, warm = (
+        identify_recordings(models[method], [simulated(*reversal, f"effects.self_heating.heating_rate={rate}")])
+        for rate in (0.0, 0.2)
+    )
+    assert "warms" not in cold.notes[0] and "as of a winding that warms by" in warm.notes[0]
+    assert np.all(widths(warm.estimates[0]) > 3.0 * widths(cold.estimates[0]))
+    assert all(e["low"] < truth < e["high"] for e, truth in zip(warm.estimates[0].values(), FAULT))
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_healthy_recording_that_does_not_fit_is_named_and_widens_what_it_calibrates(models, method):
     healthy = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 10.0])
     straight, bent = (

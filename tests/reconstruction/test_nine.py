@@ -168,12 +168,18 @@ def test_a_run_that_tells_nothing_is_nan_among_others():
         reconstruct("nine", signals, 2e-4, ACTUATOR, {"margin": 2.0})
 
 
-def test_a_winding_that_warms_is_told_by_its_rate():
+@pytest.fixture(scope="module")
+def warming():
+    """Faults, runs and clean signals of windings that warm."""
     faults, runs, _ = recordings(60, "reversal", duration=0.5, seed=7)
     runs = runs.copy()
     set_effects(runs, {"self_heating": {"heating_rate": 0.333, "Rth": 5.0}})
     command = command_positions("reversal", {"amplitude": 0.05, "speed": 0.6}, 0.5, ACTUATOR.control_period)
-    clean = simulate(runs, command, 0.5, 2e-4)
+    return faults, runs, simulate(runs, command, 0.5, 2e-4)
+
+
+def test_a_winding_that_warms_is_told_by_its_rate(warming):
+    faults, runs, clean = warming
     constant = reconstruct("nine", clean, 2e-4, ACTUATOR, {})
     assert np.mean(constant.R / truth(faults)[:, :3] - 1.0) > 4e-3  # the winding's mean temperature
     found = reconstruct("nine", clean, 2e-4, ACTUATOR, {"heating": True})
@@ -190,3 +196,17 @@ def test_a_winding_that_warms_is_told_by_its_rate():
     less = nine_bound(clean, 2e-4, ACTUATOR, LEVELS, {})
     ratio = np.sqrt(np.mean(bound, axis=0).diagonal() / np.mean(less, axis=0).diagonal())
     assert np.all(ratio[:3] > 1.3) and np.all(ratio[3:] < 1.1)
+
+
+def test_a_growth_of_r_that_is_left_out_is_told_and_noise_is_none(measured, warming):
+    growth, error = measured[1].extras["growth"].T
+    z = growth / error
+    assert abs(np.mean(z)) < 3.5 / np.sqrt(RUNS) and np.std(z) == pytest.approx(1.0, abs=3.5 / np.sqrt(2.0 * RUNS))
+    _, runs, clean = warming
+    rate = reconstruct("nine", clean, 2e-4, ACTUATOR, {"heating": True}).extras["heating_rate"]
+    grown = rate * 2e-4 * np.sum(clean["phase_current"] ** 2, axis=(1, 2))
+    without_noise = reconstruct("nine", clean, 2e-4, ACTUATOR, {}).extras["growth"][:, 0]
+    np.testing.assert_allclose(without_noise, grown, rtol=0.05)
+    growth, error = reconstruct("nine", measure(clean, runs, NOISE, 3), 2e-4, ACTUATOR, {}).extras["growth"].T
+    assert np.all(growth / error > 3.0)
+    assert np.std((growth - without_noise) / error) == pytest.approx(1.0, abs=3.5 / np.sqrt(120))

@@ -193,12 +193,13 @@ def _unexplained(recording: Recording, own: Features, identifier: Identifier) ->
 
     A method that fits no equation of its own, as the paper's, is told by the equations that ``weighted`` fits.
     """
-    said: list[str] = []
+    of_warmth, said = _warming(recording, own, identifier)
     if "fit" not in own.extras:
         try:
             own = reconstruct_recordings([recording], "weighted", identifier.actuator, {"floating": True})
         except InputError:
-            return 0.0, ["whether its voltages fit their equations is not told: too little of the recording is of use"]
+            of_fit = "whether its voltages fit their equations is not told: too little of the recording is of use"
+            return of_warmth, [*said, of_fit]
     fit, freedom = own.extras["fit"][0], own.extras["freedom"][0]
     if "nine_covariance" in own.extras and np.any(np.isnan(fit)):
         said.append(
@@ -206,13 +207,34 @@ def _unexplained(recording: Recording, own: Features, identifier: Identifier) ->
         )
     poor = np.flatnonzero(fit * freedom > chdtri(np.maximum(freedom, 1), CHANCE))
     if not len(poor):
-        return 0.0, said
+        return of_warmth, said
     phases = ", ".join(PHASES[j] for j in poor)
     said.append(
         f"the voltage of phase {phases} does not fit its equation (chi-squared {np.max(fit[poor]):.2g} per degree "
         "of freedom): intervals are widened by what that can do at most"
     )
-    return float(np.sum((fit[poor] - 1.0) * freedom[poor])), said
+    return of_warmth + float(np.sum((fit[poor] - 1.0) * freedom[poor])), said
+
+
+def _warming(recording: Recording, own: Features, identifier: Identifier) -> tuple[float, list[str]]:
+    """The same of a resistance that grows by the currents' own heat where the method takes it for constant."""
+    if "heating_rate" in own.extras:
+        return 0.0, []
+    if "growth" not in own.extras:
+        try:
+            own = reconstruct_recordings([recording], "nine", identifier.actuator, {})
+        except InputError:
+            return 0.0, []
+    growth, error = own.extras["growth"][0]
+    misfit = (growth / error) ** 2
+    if not misfit > chdtri(1, CHANCE):
+        return 0.0, []
+    by = growth / identifier.actuator.copper_coefficient
+    said = (
+        f"R changes by {growth:.2g} of its value in the recording, as of a winding that warms by {by:.2g} K: it is "
+        "found as a mean, and intervals are widened by what that can do at most; nine_heating has the rate as an unknown"
+    )
+    return float(misfit), [said]
 
 
 def _widened(estimate: dict[str, dict[str, float]], unexplained: float) -> dict[str, dict[str, float]]:

@@ -73,7 +73,8 @@ class Record:
     stretch: np.ndarray  # (row,) number of the stretch of rotor angle in which the row begins
     noise: NoiseLevels  # as the record tells it, the voltage's apart
     interval: float  # s
-    dissipated: np.ndarray | None = None  # (row,) A2 s, Q at the row's middle; None where R is constant
+    dissipated: np.ndarray  # (row,) A2 s, Q at the row's middle
+    heating: bool = False  # R grows with it at a rate that is an unknown
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ class NineFit:
     chi2: np.ndarray  # (phase,) residual variance over the one expected
     fit: np.ndarray  # mean square of the stretches' standardised mean residuals, (phase,), 1 where the equation holds
     freedom: np.ndarray  # (phase,) its degrees of freedom
+    growth: tuple[float, float]  # of R over the record, relative, were the rate an unknown too, and its standard error
 
 
 def angles_turned(speed: np.ndarray, angle: np.ndarray, interval: float) -> tuple[np.ndarray, float]:
@@ -156,19 +158,20 @@ def read_record(signals: Signals, run: int, actuator: ActuatorParameters, s: Nin
         stretch=stretches(p * angle[first - 1 : -1]),
         noise=NoiseLevels(USUAL_VOLTAGE, mean, at_end, rate_noise),
         interval=h,
-        dissipated=(np.cumsum(losses) - 0.5 * losses)[part] if s.heating else None,
+        dissipated=(np.cumsum(losses) - 0.5 * losses)[part],
+        heating=bool(s.heating),
     )
 
 
 def warmth(r: Record, rate: float) -> np.ndarray | float:
     """(row, 1) R over that at the start, 1 where it is constant."""
-    return 1.0 if r.dissipated is None else 1.0 + rate * r.dissipated[:, None]
+    return 1.0 + rate * r.dissipated[:, None] if r.heating else 1.0
 
 
 def regressors(r: Record, i: np.ndarray, end: np.ndarray, R: np.ndarray, rate: float) -> np.ndarray:
     """(row, phase, 12) derivatives of the voltages by [R, k, L, c] of phases a, b, c; a last one by the rate."""
-    X = np.zeros((*r.V.shape, UNKNOWNS + (r.dissipated is not None)))
-    if r.dissipated is not None:
+    X = np.zeros((*r.V.shape, UNKNOWNS + r.heating))
+    if r.heating:
         X[:, :, UNKNOWNS] = R * i * r.dissipated[:, None]
     warm = warmth(r, rate) * i
     for j in range(3):
@@ -248,7 +251,20 @@ def fit_record(r: Record, actuator: ActuatorParameters, stated: NoiseLevels | No
     level = np.mean(white**2) if stated is None else 1.0  # as in ``weighted``
     fit, freedom = by_stretch(r.stretch, white / np.sqrt(level), UNKNOWNS // 3)
     covariance = nine_of(information(replace(r, i=i, end=end), beta, rate, noise))
-    return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, np.full(3, freedom))
+    of_rate = (beta[CURRENT] * i * r.dissipated[:, None])[..., None]
+    more, error = _one_more(W, forward(C, G, of_rate).ravel(), white.ravel())
+    growth = more * r.dissipated[-1], error * r.dissipated[-1] * float(np.sqrt(max(level, 1.0)))
+    return NineFit(beta, rate, covariance, np.mean(white**2, axis=0), fit, np.full(3, freedom), growth)
+
+
+def _one_more(W: np.ndarray, column: np.ndarray, left: np.ndarray) -> tuple[float, float]:
+    """Value and standard error of one more unknown, from white columns (row, unknown), its own and residuals (row,)."""
+    normal, own = W.T @ W, W.T @ np.column_stack([column, left])
+    of_column, of_left = np.linalg.solve(normal, own).T
+    power = float(column @ column - own[:, 0] @ of_column)
+    if power <= 1e-12 * float(column @ column):
+        return 0.0, np.inf
+    return float(column @ left - own[:, 0] @ of_left) / power, power**-0.5
 
 
 def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: Mapping) -> Features:
@@ -256,8 +272,9 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
 
     ``extras``: ``nine_covariance`` (run, 9, 9) of [R, k, L] (SI); ``chi2`` (run, phase) residual variance over the one
     expected from the noise levels; ``fit`` (run, phase) mean square of the standardised mean residuals of 15 electrical
-    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise; with
-    ``heating`` also ``heating_rate`` (run,) in 1/(A2 s), relative growth of R. Without end
+    degrees, chi-squared over its ``freedom`` (run, phase) where the equation holds, whatever the noise; ``growth``
+    (run, 2) of R over the record beyond what is fitted, relative, and its standard error; with ``heating`` also
+    ``heating_rate`` (run,) in 1/(A2 s), relative growth of R. Without end
     currents L_j is not measured: what ``weighted`` makes of floating and plateau samples is returned, with L_j nominal
     to 30 %, and ``fit`` is NaN.
 
@@ -272,7 +289,8 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
     runs = signals.runs
     nine, chi2, fit = np.full((runs, 9, 9), np.nan), np.full((runs, 3), np.nan), np.full((runs, 3), np.nan)
     freedom = np.zeros((runs, 3), np.int64)
-    told = {"chi2": chi2, "fit": fit, "freedom": freedom, "nine_covariance": nine}
+    growth = np.full((runs, 2), np.nan)
+    told = {"chi2": chi2, "fit": fit, "freedom": freedom, "growth": growth, "nine_covariance": nine}
     rate = np.full(runs, np.nan)
     if s.heating:
         told["heating_rate"] = rate
@@ -294,5 +312,6 @@ def reconstruct_nine(signals: Signals, actuator: ActuatorParameters, settings: M
         if estimate is not None:
             beta[:, run], nine[run], chi2[run] = estimate.beta, estimate.covariance, estimate.chi2
             fit[run], freedom[run], rate[run] = estimate.fit, estimate.freedom, estimate.rate
+            growth[run] = estimate.growth
     R, k, L, offset = beta
     return Features(R, k, L, offset, nine[:, :6, :6].copy(), told)
