@@ -232,7 +232,7 @@ def _warming(recording: Recording, own: Features, identifier: Identifier) -> tup
     by = growth / identifier.actuator.copper_coefficient
     said = (
         f"R changes by {growth:.2g} of its value in the recording, as of a winding that warms by {by:.2g} K: it is "
-        "found as a mean, and intervals are widened by what that can do at most; nine_heating has the rate as an unknown"
+        "found as a mean, and intervals are widened by what that can do at most; nine_heating has the rate unknown"
     )
     return float(misfit), [said]
 
