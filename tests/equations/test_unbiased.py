@@ -6,14 +6,19 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from emafault.actuator.commands import command_positions
+from emafault.actuator.parameters import make_runs
 from emafault.actuator.sensors import SensorNoise
+from emafault.actuator.shape import trapezoid_at
+from emafault.actuator.simulate import simulate
+from emafault.closed_form import PHASE_AXIS
 from emafault.diagnosis.described import Described, with_forms
 from emafault.diagnosis.linear import assemble, compressed_columns, correct, disturbance
 from emafault.diagnosis.whitening import whiten
 from emafault.equations import electrical
 from emafault.equations.point import Point, State
 
-from .conftest import NOISE, machine_of, recorded
+from .conftest import ACTUATOR, NOISE, machine_of, recorded
 from .test_residuals import truth
 
 QUIET = SensorNoise(**{channel: 0.05 * size for channel, size in asdict(NOISE).items()})
@@ -248,3 +253,26 @@ def test_what_makes_a_speed_early_or_late_makes_the_angle_s_noise_another(values
     )
     noise = whiten(one.bands, one.usable, (other.residual - one.residual)[:, None])[one.usable]
     assert np.mean(noise**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(noise)))
+
+
+@pytest.mark.parametrize("displaced", [0.0, 4.0])
+def test_the_torque_is_that_of_currents_that_rise_and_fall_evenly(displaced):
+    """Between what is recorded, too: against the products of shape and current in steps of two microseconds."""
+    fine, interval, duration = 2e-6, 2e-4, 0.4
+    effects = {"hall_displacement": {f"d_{j}": displaced for j in "abc"}}
+    runs = make_runs(ACTUATOR, np.zeros((1, 6)), effects=effects)
+    settings = {"amplitude": 0.2, "frequency": 2.0}
+    position = command_positions("sine", settings, 0.8, ACTUATOR.control_period)
+    each = simulate(runs, position, duration, fine)
+    many = round(interval / fine)
+    angle, current = each["rotor_angle"][0], each["phase_current"][0]
+    true = 0.0
+    for j in range(3):
+        x = ACTUATOR.pole_pairs * (angle - 0.5 * fine * each["rotor_speed"][0]) - PHASE_AXIS[j]
+        true = true + (trapezoid_at(x, np.pi / 6.0)[0] * current[:, j]).reshape(-1, many).mean(axis=1)
+    machine = machine_of({"a.nc": recorded("sine", effects, settings=settings, theta_0=0.0)})
+    values = {n: p.off for n, p in machine.parameters.items()} | {f"hall_displacement.d_{j}": displaced for j in "abc"}
+    machine.prepare("a.nc", values)
+    state = State(machine.recordings["a.nc"], Point(values, "a.nc", ()))
+    found = sum(np.asarray(state.conducting[j].value * state.current[j].value)[: len(true)] for j in range(3))
+    assert abs(found @ true / (true @ true) - 1.0) < 1e-3

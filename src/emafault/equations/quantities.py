@@ -11,6 +11,7 @@ from .signals import passing_time
 from .terms import with_hook
 
 PLATEAU = np.pi / 6.0  # electrical rad, where the commutation switches a phase on
+NARROW = 1e-5  # electrical rad; a phase that is on for less carries no current
 
 
 def fill(state: State) -> None:
@@ -90,22 +91,47 @@ def _before(x: np.ndarray) -> np.ndarray:
 
 
 def _conducting_shape(state: State, j: int, low, high, shift, ramp) -> Dual:
-    """Mean of f over the part of each interval in which phase j is switched on.
+    """Mean of f over each interval, weighted as the current of phase j is.
 
-    The mean of f i is the mean current times this, even where the current sets in within the interval. Switched off, by
-    the edge of the phase that replaces it, it flows on until the bus voltage has taken it down.
+    The mean of f i is the mean current times this, even where the current sets in within the interval. Switched on, the
+    current rises evenly, and switched off, by the edge of the phase that replaces it, it falls evenly, over the angle
+    turned while it passes from phase to phase.
     """
     rec, motor = state.rec, state.rec.actuator
     passed = motor.pole_pairs * rec.speed * passing_time(motor, rec.level)
-    flows_on = np.clip(passed, -PLATEAU, PLATEAU)
-    centre = 0.5 * (low + high)
-    half_turn = np.pi * np.floor(centre / np.pi)
-    first = half_turn + PLATEAU - _early(state, j) + np.minimum(flows_on, 0.0)
-    last = half_turn + np.pi - PLATEAU - _early(state, (j + 1) % 3) + np.maximum(flows_on, 0.0)
-    a, b = np.clip(low, first, last), np.clip(high, first, last)
-    narrow = b - a < 1e-5
-    b = np.where(narrow, a + 1e-5, b)
-    return _mean_shape(state, a, b, shift, ramp) * (1.0 / (b - a))
+    turned = np.clip(passed, -PLATEAU, PLATEAU)
+    half_turn = np.pi * np.floor(0.5 * (low + high) / np.pi)
+    first = half_turn + PLATEAU - _early(state, j)
+    last = half_turn + np.pi - PLATEAU - _early(state, (j + 1) % 3)
+    on, off = np.where(turned < 0.0, last, first), np.where(turned < 0.0, first, last)
+    rises, stays, falls = (
+        _within(low, high, *ends) for ends in ((on, on + turned), (on + turned, off), (off, off + turned))
+    )
+    per = 1.0 / np.where(turned == 0.0, 1.0, turned)
+    risen, left = (0.5 * (rises[0] + rises[1]) - on) * per, 1.0 - (0.5 * (falls[0] + falls[1]) - off) * per
+    length = risen * (rises[1] - rises[0]) + (stays[1] - stays[0]) + left * (falls[1] - falls[0])
+    narrow = length < NARROW
+    # where no current flows the shape counts for nothing, and is that beside the edge
+    stays = stays[0], np.where(narrow, stays[0] + NARROW, stays[1])
+    per, risen, left = (np.where(narrow, 0.0, x) for x in (per, risen, left))
+    total = _mean_shape(state, *stays, shift, ramp)
+    for (begin, end), share, change in ((rises, risen, per), (falls, left, -per)):
+        # the mean of the product of what changes evenly is not that of the means
+        bend = change * (end - begin) ** 2 / 12.0
+        total = total + _mean_shape(state, begin, end, shift, ramp) * share + bend * _change(begin, end, shift, ramp)
+    return total * (1.0 / np.maximum(length, NARROW))
+
+
+def _within(low: np.ndarray, high: np.ndarray, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The part of each interval that lies between two ends."""
+    ends = np.minimum(one, other), np.maximum(one, other)
+    return np.clip(low, *ends), np.clip(high, *ends)
+
+
+def _change(begin: np.ndarray, end: np.ndarray, shift, ramp) -> np.ndarray:
+    """By how much f changes from one angle to another."""
+    off, r = float(value_of(shift)), float(value_of(ramp))
+    return trapezoid_at(end - off, r)[0] - trapezoid_at(begin - off, r)[0]
 
 
 def _early(state: State, j: int) -> float:
