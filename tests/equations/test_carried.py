@@ -152,6 +152,14 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"offset_speed.all": 0.5},
             {"place": "speed", "form": "drift", "at_start": 0.5, "at_end": 0.5},
         ),
+        (
+            "~drift_voltage_c",
+            {"offset_voltage.c": 0.1, "rate_voltage.c": 0.2},
+            {
+                "place": "voltage_c", "form": "drift", "at_start": 0.1, "at_end": 0.4,
+                "recordings": {"one.nc": {"at_start": 0.1, "at_end": 0.3}, "two.nc": {"at_start": 0.1, "at_end": 0.5}},
+            },
+        ),
         ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
         ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
         (
@@ -208,7 +216,7 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
     ],
 )  # fmt: skip
 def test_faults_of_the_measuring_chain(unit, values, wanted):
-    entry = of_chain(unit, {n: (v, 0.01) for n, v in values.items()})
+    entry = of_chain(unit, {n: (v, 0.01) for n, v in values.items()}, {"one.nc": 1.0, "two.nc": 2.0})
     assert entry == wanted
     check_unlisted([entry])
 

@@ -167,6 +167,25 @@ def test_an_offset_that_warms_up_is_told_and_undone():
     assert _off(undone, true, "phase_current") < 0.05 * _off(faulty, true, "phase_current")
 
 
+def test_a_voltage_that_drifts_alike_in_all_recordings_beside_held_currents():
+    """Neither had been: a remainder of that phase explained the drift by less, and one of another what was held."""
+    true, faulty = bench(COGGING), {}
+    for n, (name, r) in enumerate(true.items()):
+        current = {"phase_current": r.phase_current.copy(), "phase_current_end": r.phase_current_end.copy()}
+        for k in 1 + np.flatnonzero(np.random.default_rng(n).random(len(r.time) - 1) < 0.03):
+            for x in current.values():
+                x[k, 0] = x[k - 1, 0]
+        faulty[name] = replace(r, phase_voltage=r.phase_voltage + np.outer(0.4 * r.time, [0, 0, 1]), **current)
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    told = {d["unit"]: d for d in found.verdict["discovered"]}
+    assert set(told) == {"~held", "~drift_voltage_c"}
+    assert told["~drift_voltage_c"]["parameters"]["rate_voltage.c"]["value"] == pytest.approx(0.4, rel=0.02)
+    undone, _ = corrected(found, faulty)
+    assert _off(undone, true, "phase_voltage") < 0.05 * _off(faulty, true, "phase_voltage")
+
+
 @pytest.mark.long
 def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder():
     verdict = verdict_of(bench(COGGING, replace(ACTUATOR, gear_ratio=ACTUATOR.gear_ratio / 1.003)))

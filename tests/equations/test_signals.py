@@ -108,3 +108,23 @@ def test_the_noise_s_square_does_not_go_along_the_current():
         products.append(np.mean((block.residual * block.coordinates["drivers"][1])[low]))
     expected = -ACTUATOR.resistance * 2.0 / 3.0 * noisy.current**2  # of a current less the mean of three
     assert np.mean(products) == pytest.approx(expected, abs=4.0 * np.std(products) / np.sqrt(len(products)))
+
+
+def test_a_sample_that_is_held_is_none_of_its_interval():
+    plain, rows = recorded(), np.array([400, 900, 1500, 1501])
+    at_end = plain.phase_current_end.copy()
+    for k in rows:
+        at_end[k, 1] = at_end[k - 1, 1]
+    of_end = Signals.of("r.nc", replace(plain, phase_current_end=at_end), ACTUATOR, NOISE)
+    assert np.array_equal(np.flatnonzero(of_end.lost), [400, 401, 900, 901, 1500, 1501, 1502])
+    voltage = plain.phase_voltage.copy()
+    for k in rows:
+        voltage[k, 2] = voltage[k - 1, 2]
+    assert np.array_equal(
+        np.flatnonzero(Signals.of("r.nc", replace(plain, phase_voltage=voltage), ACTUATOR, NOISE).lost), rows
+    )
+    # a phase that is off has no current, and coarse steps repeat by themselves
+    quiet = recorded(noise=SensorNoise(**dict.fromkeys(asdict(NOISE), 0.0)))
+    coarse = in_steps(plain, {"phase_current": 0.1})
+    for recording in (plain, quiet, coarse):
+        assert not Signals.of("r.nc", recording, ACTUATOR, NOISE).lost.any()

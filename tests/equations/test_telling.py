@@ -93,3 +93,19 @@ def test_a_gain_that_drifts_is_told_with_what_it_comes_to():
     told = told_of_chain("~gain_current", "sensor_current", gains, dict.fromkeys(gains, "1"), ACTUATOR)
     said = "In the measuring chain: the gain of the recorded currents drifts along each recording, by +1 to +2 % to its"
     assert told["sentence"] == f"{said} end." and told["form"] == "drift"
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"rate_voltage.c": (0.2, 1e-3)}, "drifts by 0.2 V/s"),
+        (
+            {"offset_voltage.c": (0.1, 1e-3), "rate_voltage.c": (0.2, 1e-3)},
+            "has an offset of 0.1 V and drifts by 0.2 V/s",
+        ),
+    ],
+)
+def test_a_channel_that_drifts_alike_in_all_recordings_is_told_by_its_rate(values, says):
+    units = {"rate_voltage.c": "V/s", "offset_voltage.c": "V"}
+    told = told_of_chain("~drift_voltage_c", "sensor_voltage", values, {n: units[n] for n in values}, ACTUATOR)
+    assert told["sentence"] == f"In the measuring chain: the voltage channel of phase c {says}."

@@ -22,6 +22,7 @@ OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
 GAIN_NAMES = ("gain", "gain_drift")
+RATE = "rate"  # of a channel's offset, that grows with time in all recordings alike
 
 
 def delayed(x: np.ndarray) -> np.ndarray:
@@ -221,11 +222,15 @@ def _new_errors(rec: Signals) -> dict[str, np.ndarray]:
 
 
 def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
-    """(sample,) what a channel has too much: an offset, of all or of the recording's own, and what grows along it."""
+    """(sample,) what a channel has too much: an offset, of all or of the recording's own, what grows along it, and what
+    grows with time in all of them alike."""
     out: Dual | float = 0.0
+    rate = p(f"{RATE}_{quantity}.{phase}")
+    if rate.slopes or rate.value:
+        out = rate * rec.time
     always, offset, drift = (p(f"{n}_{quantity}.{phase}{at}") for n, at in drifting(rec.name))
     if drift.slopes or drift.value:
-        out = drift * (rec.time / rec.time[-1])
+        out = out + drift * (rec.time / rec.time[-1])
     for level in (always, offset):
         if level.slopes or level.value:
             out = out + level * np.ones(rec.size)

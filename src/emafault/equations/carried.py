@@ -13,7 +13,7 @@ from ..actuator.grammar import EACH, PHASES
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
-from .acquisition import GAIN_NAMES
+from .acquisition import GAIN_NAMES, RATE
 from .parameters import BEYOND
 from .sensor_speed import SENSOR
 from .telling import subject
@@ -86,8 +86,11 @@ def of_form(
     return _rounded(entry | {"amplitude": amplitude, EACH: own})
 
 
-def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | None:
-    """Entry of a unit that has parameters of its own: a lag, crosstalk, drift, curve or drop, the back-EMF's shape."""
+def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapping[str, float]) -> Entry | None:
+    """Entry of a unit that has parameters of its own: a lag, crosstalk, drift, curve or drop, the back-EMF's shape.
+
+    ``lengths`` : of the recordings (s), by name
+    """
     kind, _, channel = unit.removeprefix("~").partition("_")
     values = {name.partition(".")[2]: v for name, (v, _) in linear.items()}
     if kind == "lag":
@@ -126,8 +129,11 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]]) -> Entry | No
         return _rounded({"place": place, "form": "gain", **_means(gains), EACH: gains})
     if kind == "drift":
         if all("@" not in full for full in linear):
-            ((offset, _),) = linear.values()
-            return _rounded({"place": channel, "form": "drift", "at_start": offset, "at_end": offset})
+            alike = {full.partition("_")[0]: v for full, (v, _) in linear.items()}
+            start, rate = alike.get("offset", 0.0), alike.get(RATE, 0.0)
+            ends = {n: {"at_start": start, "at_end": start + rate * length} for n, length in lengths.items()}
+            whole: Entry = {"place": channel, "form": "drift", **_means(ends)}
+            return _rounded(whole | ({EACH: ends} if rate and len(set(lengths.values())) > 1 else {}))
         own: dict[str, dict[str, float]] = {}
         for full, (v, _) in linear.items():
             entry = own.setdefault(full.partition("@")[2], {"at_end": 0.0})

@@ -12,7 +12,7 @@ from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import calm_motion, without_spikes
 from ..switches import direction
-from .acquisition import GAIN_NAMES, drifting, full_range, rates, undone
+from .acquisition import GAIN_NAMES, RATE, drifting, full_range, rates, undone
 from .diagnose import Diagnosed
 from .point import Point
 from .position import SCALED
@@ -33,14 +33,14 @@ def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[di
     """
     out, undone = {}, dict[str, None]()
     for name, recording in recordings.items():
-        for what, undo in _steps(found, name, len(recording.time)):
+        for what, undo in _steps(found, name, len(recording.time), recording.interval):
             recording = undo(recording)
             undone[what] = None
         out[name] = recording
     return out, list(undone)
 
 
-def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]:
+def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[tuple[str, Undo]]:
     """What is to be undone in a recording, in words, and how."""
     told = {d["unit"] for d in found.verdict["discovered"]}
     values = found.values
@@ -76,7 +76,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
         yield "ambient temperature", partial(_warmer, by=values.get(f"ambient.start@{name}", 0.0))
     for quantity in ("speed", "output"):
         if f"~drift_{quantity}" in told:
-            x = _drifted(values, quantity, "all", name, share)
+            x = _drifted(values, quantity, "all", name, share, size * interval)
             yield f"drift of the {quantity}", partial(_less, channel=quantity, x=x)
     if "~scale_output" in told:
         scale = 1.0 + sum(values.get(f"gain_output.{whose}", 0.0) for whose in SCALED)
@@ -84,7 +84,7 @@ def _steps(found: Diagnosed, name: str, size: int) -> Iterator[tuple[str, Undo]]
     for quantity in ("voltage", "current"):
         for phase in "abc":
             if f"~drift_{quantity}_{phase}" in told:
-                x = _drifted(values, quantity, phase, name, share)
+                x = _drifted(values, quantity, phase, name, share, size * interval)
                 yield f"drift of the {quantity} of phase {phase}", partial(_less, channel=f"{quantity}_{phase}", x=x)
         if f"~gain_{quantity}" in told:
             gain, growth = (
@@ -139,10 +139,12 @@ def _less_drop(recording: Recording, drops: np.ndarray, turn: float) -> Recordin
     return replace(recording, phase_voltage=recording.phase_voltage - too_much)
 
 
-def _drifted(values: Mapping[str, float], quantity: str, phase: str, recording: str, share: np.ndarray) -> np.ndarray:
-    """(sample,) what a channel has too much, at a ``share`` of the recording."""
+def _drifted(
+    values: Mapping[str, float], quantity: str, phase: str, recording: str, share: np.ndarray, length: float
+) -> np.ndarray:
+    """(sample,) what a channel has too much, at a ``share`` of the recording and its ``length`` (s)."""
     always, start, grows = (values.get(f"{kind}_{quantity}.{phase}{at}", 0.0) for kind, at in drifting(recording))
-    return always + start + grows * share
+    return always + start + (grows + length * values.get(f"{RATE}_{quantity}.{phase}", 0.0)) * share
 
 
 def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:

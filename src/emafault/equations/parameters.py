@@ -206,26 +206,28 @@ def _shows(channel: str) -> tuple[str, ...]:
 
 
 def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
-    """Channels whose offset grows along a recording or is another one in each, or whose gain is; and a scale of the
-    output position that is off.
+    """Channels whose offset grows, in all recordings alike or along each, or is another one in each, or whose gain is;
+    and a scale of the output position that is off.
 
     A current's offset that is always the same is in the catalogue, and so is the speed's scale.
     """
     out = []
     others = [n for n in recordings if n != reference]
     noise = next(iter(recordings.values())).noise
+    longest = max(r.size * r.interval for r in recordings.values())
     for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s"), ("output", "rad")):
         sd = FAR_OUT * float(getattr(noise, {"output": "position"}.get(quantity, quantity)))
         phases = PER_PHASE if quantity in ("current", "voltage") else ("all",)
         for j in phases:
-            always = Variant([Parameter(f"offset_{quantity}.{j}", 0.0, 0.0, sd, units)])
+            always = Parameter(f"offset_{quantity}.{j}", 0.0, 0.0, sd, units)
+            rate = Parameter(f"{acquisition.RATE}_{quantity}.{j}", 0.0, 0.0, sd / longest, f"{units}/s")
             each, along = (
                 [Parameter(f"{kind}_{quantity}.{j}@{n}", 0.0, 0.0, sd, units) for n in recordings]
                 for kind in ("offset", "drift")
             )
-            variants = [Variant(along), Variant(each), Variant([*each, *along])]
+            variants = [Variant(along), Variant(each), Variant([*each, *along]), Variant([rate])]
             unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
-            variants += [always] if quantity != "current" else []
+            variants += [Variant([always]), Variant([always, rate])] if quantity != "current" else []
             # evenly over the quantities, then over a quantity's phases and its gain
             among = 4.0 * (len(phases) + 1 if quantity in GAINED else 1)
             out.append(Unit(unit, "form", _shows(quantity), variants, among=among))

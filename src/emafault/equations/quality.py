@@ -11,7 +11,7 @@ from ..io.currents_noise import adds_up, resting_noise
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
-from ..io.updates import updates
+from ..io.updates import repeated, updates
 from .signals import MAY_BE_SLOWER
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
@@ -28,7 +28,6 @@ BY_STEPS = {"rotor_speed": "speed_quantisation", "rotor_angle": None}
 ROWS = 12  # recordings in the picture of their quality
 SUMMED = ("phase_current", "bus_voltage")
 CERTAIN = 0.999  # of what is counted and not inferred
-HELD = 3  # samples equal to the one before, which a channel with noise never shows
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
     step = max(lattice_step(x) for x in values.T)
     if step > 0.0:  # which repeats samples, and stands out, by itself
         return Channel(noise, step, 0.0, 0.0, clipped, level)
-    held = max(_repeated(x) for x in values.T)
+    held = max(float(np.mean(repeated(x)[1:])) for x in values.T)
     rate = len(spikes(values)) / len(values) if summed and not held else 0.0
     return Channel(noise, 0.0, held, rate, clipped, level)
 
@@ -138,13 +137,6 @@ def at_a_glance(quality: Mapping[str, Mapping[str, Channel]]) -> dict[str, dict[
 def _noise(x: np.ndarray) -> float:
     third = np.diff(x, 3)
     return float(np.median(np.abs(third - np.median(third))) / 0.6745 / np.sqrt(20.0)) if len(third) else 0.0
-
-
-def _repeated(x: np.ndarray) -> float:
-    """Share of the samples equal to the one before, where the channel moves otherwise; what stays at an end of its
-    range is cut off there and not held."""
-    same = (np.diff(x) == 0.0) & (x[1:] > x.min()) & (x[1:] < x.max())
-    return float(same.mean()) if HELD <= same.sum() < 0.5 * len(same) else 0.0
 
 
 def _entry(

@@ -14,7 +14,7 @@ from ..actuator.sensors import CHANNEL, SensorNoise
 from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
-from ..io.sensors import bridged, calm_motion, cut_off, stalled, without_spikes
+from ..io.sensors import bridged, calm_motion, cut_off, held, stalled, without_spikes
 from ..io.updates import across, updates
 from .dual import Dual
 
@@ -49,7 +49,9 @@ class Signals:
     ambient: float
     health: str
     noise: SensorNoise
-    lost: np.ndarray  # (sample,) bool: a current or voltage is cut off or a spike, here or next to it, or all stalled
+    lost: (
+        np.ndarray
+    )  # (sample,) bool: a current or voltage is held, cut off or a spike, here or beside it, or all stood
     stalled: np.ndarray  # (sample,) bool: nothing was recorded, or not long before or after
     zero_error: float = 0.0  # electrical rad, standard error of the angle's zero, where it was fitted to the voltages
     speed_step: float = 0.0  # rad/s, of a channel whose values lie on a lattice, as the next two
@@ -72,7 +74,7 @@ class Signals:
         if stood.any():
             r = bridged(r, stood)
             stood = binary_dilation(stood, iterations=1 + odd(SPEED_SPAN / r.interval) // 2)
-        lost = stood.copy()
+        lost = stood | held(r)
         for cut in cut_off(r).values():
             lost |= binary_dilation(cut.any(axis=1))
         current, rows = without_spikes(r.phase_current)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
-from .acquisition import GAIN_NAMES, full_range
+from .acquisition import GAIN_NAMES, RATE, full_range
 from .sensor_speed import SENSOR
 from .telling import Z
 
@@ -142,8 +142,9 @@ def _crosstalk(fault: Fault) -> Told:
 def _drift(fault: Fault) -> Told:
     unit = next(iter(fault.units.values()))
     if all("@" not in n for n in fault.linear):
-        (offset,) = fault.values.values()
-        return Told(f"the {fault.whose} has an offset of {offset:.2g} {unit}", "drift")
+        says = {"offset": "has an offset of {:.2g} {}", RATE: "drifts by {:.2g} {}"}
+        parts = [says[n.partition("_")[0]].format(v, fault.units[n]) for n, v in fault.values.items()]
+        return Told(f"the {fault.whose} {' and '.join(parts)}", "drift")
     starts = [v for n, v in fault.values.items() if n.startswith("offset")]
     if not starts:
         return Told(f"the {fault.whose} drifts", "drift")

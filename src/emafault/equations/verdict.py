@@ -200,7 +200,8 @@ def _discovered(fitted: Fitted) -> list[dict]:
         else:
             units = {p.name: p.units for p in unit.parameters}
             entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
-            entry["term"] = carried.of_chain(form, linear)
+            lengths = {n: r.size * r.interval for n, r in bench.machine.recordings.items()}
+            entry["term"] = carried.of_chain(form, linear, lengths)
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,

@@ -1,7 +1,7 @@
 """Fitted numbers of the reference actuator in words, as the table of a page has them; keys stay those of the model."""
 
 from ..diagnosis.described import Described
-from .acquisition import GAIN_NAMES
+from .acquisition import GAIN_NAMES, RATE
 from .point import SEEDED
 from .telling import bare
 from .telling_chain import CHANNELS, LATE, channel_in_words, of_phase
@@ -123,8 +123,9 @@ def _of_group(group: str, short: str) -> str:
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
         **{
-            f"{kind}_{q}": f"{kind} of the {CHANNELS.get(q, q)} channel" + f" of phase {short}" * (short != "all")
-            for kind in ("drift", "offset")
+            f"{kind}_{q}": f"{kind.replace(RATE, 'rate of drift')} of the {CHANNELS.get(q, q)} channel"
+            + f" of phase {short}" * (short != "all")
+            for kind in ("drift", "offset", RATE)
             for q in ("current", "voltage", "speed", "output")
         },
         "gain_output": f"gain of the output position, less one, of the {short}",

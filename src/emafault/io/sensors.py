@@ -14,7 +14,7 @@ from .lattice import lattice_step
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
-from .updates import across, updates
+from .updates import across, repeated, updates
 
 SLOWEST_INTERVAL = 1e-3  # s
 LEAST_TRAVEL = 0.1  # rad of the rotor; less is standing still
@@ -124,6 +124,21 @@ def stalled(recording: Recording) -> np.ndarray:
         if beyond > last + 1:
             step = abs(angle[beyond] - angle[last + 1]) / (beyond - last - 1)
             out[before + 1 : last + 1] = abs(angle[last + 1] - angle[last]) > 0.5 * step * (length + 1)
+    return out
+
+
+def held(recording: Recording) -> np.ndarray:
+    """(sample,) bool: where a voltage or current repeats the sample before and is none of the interval's own; a current
+    at an interval's end is one of the next interval, too. Coarse steps repeat by themselves."""
+    out = np.zeros(len(recording.time), bool)
+    for channel in ("phase_voltage", "phase_current", "phase_current_end"):
+        values = getattr(recording, channel)
+        for x in values.T if values is not None else ():
+            same = repeated(x)
+            if same.any() and lattice_step(x) == 0.0:
+                out |= same
+                if channel == "phase_current_end":
+                    out[1:] |= same[:-1]
     return out
 
 

@@ -1,4 +1,5 @@
-"""Channels slower than the recording: a value held until the next one comes, or straight lines between values."""
+"""Samples that are no new ones: of channels slower than the recording, whose value is held until the next one comes or
+goes to it in a straight line, and single ones that repeat the one before."""
 
 import numpy as np
 
@@ -8,6 +9,7 @@ MOST = 0.6  # of the samples, that are new on such a channel
 FEWEST = 50  # new samples
 APART = 0.98  # of the new samples, that no other is next to; or that lie a period apart
 LONGEST = 200  # samples of a period
+HELD = 3  # samples equal to the one before, which a channel with noise never shows
 STRAIGHT = 1e-7  # of a signal's largest value, that a straight line may be rounded by
 
 
@@ -22,6 +24,13 @@ def updates(x: np.ndarray) -> np.ndarray:
             rows[-1] &= new is held  # where a line is cut off nothing is known to be new
             return rows
     return np.ones(len(x), bool)
+
+
+def repeated(x: np.ndarray) -> np.ndarray:
+    """(sample,) bool: samples of a channel (sample,) that repeat the one before to the last digit, where it moves
+    otherwise; what stays at an end of its range is cut off there, and what stays at zero is off."""
+    same = np.append(False, np.diff(x) == 0.0) & (x > x.min()) & (x < x.max()) & (x != 0.0)
+    return same if HELD <= same.sum() < 0.5 * len(x) else np.zeros(len(x), bool)
 
 
 def across(x: np.ndarray, new: np.ndarray) -> np.ndarray:
