@@ -7,6 +7,7 @@ thousand, but for the numbers of its rows.
 import math
 import os
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -68,7 +69,7 @@ def at_most(rows: np.ndarray, seed: int, parts: int = 1) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Rows:
+class Rows(ABC):
     """Features of simulated runs in SI units, with their truth, wherever they are kept."""
 
     features: Table  # (run, 6), (run, 8) or (run, 9), NaN where a record gave none
@@ -94,9 +95,9 @@ class Rows:
         """The rows, at most ``MOST_AT_ONCE`` of them, in memory."""
         return self.rows(at_most(np.arange(len(self.features)), seed))
 
+    @abstractmethod
     def each(self, function: Callable[["TrainingRows"], "TrainingRows"]) -> "Rows":
         """What a function makes of the rows, kept as they are."""
-        raise NotImplementedError
 
     def identified(self) -> "Rows":
         """The rows that have features, with a covariance if all of them tell one.

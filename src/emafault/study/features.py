@@ -12,7 +12,6 @@ from ..actuator.parameters import ActuatorParameters
 from ..dataset import BLOCK, count_runs, read_blocks
 from ..errors import InputError
 from ..faults import FAULT_NAMES
-from ..identification.rows import in_blocks
 from ..io.atomic import replace_atomically
 from ..io.recording import PHASES
 from ..places import file_at
@@ -188,16 +187,16 @@ def read_features(path: str | Path) -> FeatureTable:
         return _read(file, slice(None))
 
 
-def read_features_in_blocks(path: str | Path) -> Iterator[FeatureTable]:
-    """The same, a block of runs at a time.
+def read_features_in_blocks(path: str | Path, size: int) -> Iterator[FeatureTable]:
+    """The same, so many runs at a time.
 
     Raises
     ------
     InputError : no such file, or not one of these
     """
     with _opened(path) as file:
-        for rows in in_blocks(len(file.dimensions["run"])):
-            yield _read(file, rows)
+        for first in range(0, len(file.dimensions["run"]), size):
+            yield _read(file, slice(first, first + size))
 
 
 def runs_in(path: str | Path) -> int:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..identification.evaluation import fault_range
 from ..identification.fitting import Prior, Recipe, fit_identifier
 from ..identification.posterior import Knowledge
-from ..identification.rows import MOST_AT_ONCE, Rows, TrainingRows, store
+from ..identification.rows import BLOCK, MOST_AT_ONCE, Rows, TrainingRows, store
 from ..identification.search import SearchSettings, Trial, choose, finished, ranked, run_worker
 from ..io.atomic import whole_folder, write_text
 from ..plain import read_json
@@ -130,7 +130,7 @@ def learning_rows(features: str, scratch: Path, units: Mapping[str, Any] | None 
 
     def each() -> Iterator[TrainingRows]:
         first = 0
-        for table in read_features_in_blocks(features):
+        for table in read_features_in_blocks(features, BLOCK):
             yield rows_of(table, first)
             first += len(table.faults)
 
