@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from emafault.diagnosis.evidence import Normal
+from emafault.diagnosis.evidence import Normal, Reduced
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import TOLERANCES, Block, Parameter, Unit, Variant
-from emafault.diagnosis.sets import Choice, Model
+from emafault.diagnosis.sets import OTHER_FORM, WIDTHS, Choice, Model
 from emafault.diagnosis.settling import Began, between
 
 ROWS = 4000
@@ -241,3 +241,23 @@ def test_the_hole_of_a_calibration_has_its_edges_at_values_of_the_unit():
     variant = Variant([Scaled.parameters["k+"]], hole=[TOLERANCES * 0.1 / 0.5])
     low, high = Bench(Scaled(), ["r"])._hole(variant)[:, 0] * 0.5
     assert np.exp([low, high]) == pytest.approx([0.6, 1.4])
+
+
+@pytest.mark.parametrize(("size", "widths"), [(0.02, WIDTHS), (2.0, (1.0, 0.3)), (40.0, (1.0,))])
+def test_an_own_form_goes_with_no_prior_that_its_unit_is_too_large_for(size, widths):
+    """In proportion to the unit's size it would stand in for all that such a prior has no room for."""
+
+    class Shaped(Machine):
+        units = (Unit("b", "structural", ("torque",), [Variant([Parameter("b", 0.0, 0.0, 10.0)])]),)
+        parameters = {"a": Parameter("a", 0.0, 0.0, 1.0), "b": Parameter("b", 0.0, 0.0, 10.0)}  # noqa: RUF012
+
+        def own_families(self, equation):
+            return ()
+
+    bench = Bench(Shaped(), ["r"])
+    bench.sizes = {"b": {"b": -size}}
+    names = ["a", "b", "own.b.torque.0"]
+    reduced = Reduced(names, np.eye(3), np.zeros(3), 0.0, np.zeros(3))
+    _, candidates = bench.candidates(reduced)
+    assert candidates["b", 0].widths == WIDTHS
+    assert {c.widths for (_, v), c in candidates.items() if v >= OTHER_FORM} == {widths}

@@ -128,3 +128,19 @@ def test_a_sample_that_is_held_is_none_of_its_interval():
     coarse = in_steps(plain, {"phase_current": 0.1})
     for recording in (plain, quiet, coarse):
         assert not Signals.of("r.nc", recording, ACTUATOR, NOISE).lost.any()
+
+
+def test_no_row_of_the_torque_spans_a_reversal_however_quick_it_is():
+    quiet = replace(NOISE, angle=1e-3 * NOISE.angle)
+    passed = 0
+    for frequency in (2.0, 4.0, 6.0):
+        quick = recorded("sine", noise=quiet, settings={"amplitude": 0.1, "frequency": frequency})
+        machine = machine_of({"a.nc": quick})
+        rec = machine.recordings["a.nc"]
+        values = {n: p.off for n, p in machine.parameters.items()}
+        [block] = [b for b in machine.blocks(values, "a.nc", wanted=set()) if b.equation == "torque"]
+        turns = np.flatnonzero((rec.rate[:-1] * rec.rate[1:] < 0.0) & (np.abs(rec.rate[1:]) > 1.0))
+        # a row has the interval before its angle and the one after, the speed of a reversal is known to a sample
+        assert not block.usable[turns].any()
+        passed += len(turns)
+    assert passed >= 8

@@ -243,9 +243,10 @@ class NormalEquations(Point):
                     self._hole(variant), np.array([self._tolerance(p) for p in variant.parameters]),
                 )  # fmt: skip
                 out[unit.id, v] = plain
+                wide = self._as_wide_as_sized(unit.id, plain) if len(own) else ()
                 for k, (share, inside) in enumerate(self._own_kinds(reduced, own), start=1):
                     own_sd = np.full(len(inside), share * OWN_FORM)
-                    out[unit.id, v + k * OTHER_FORM] = replace(plain, extra=inside, extra_sd=own_sd)
+                    out[unit.id, v + k * OTHER_FORM] = replace(plain, widths=wide, extra=inside, extra_sd=own_sd)
         left: dict[str, tuple[list[int], list[int]]] = {}
         for k, n in enumerate(reduced.names):
             if n.startswith("remainder."):
@@ -265,6 +266,16 @@ class NormalEquations(Point):
                     [reduced.names[k] for k in index],
                 )  # fmt: skip
         return [*self.units, *self.remainders.values()], out
+
+    def _as_wide_as_sized(self, unit: str, plain: Candidate) -> tuple[float, ...]:
+        """Widths of a unit's prior that leave room for the size to which its own form is in proportion: under a
+        narrower one the form would stand in for the unit."""
+        sizes = self.sizes.get(unit, {})
+        sized = [k for k, n in enumerate(plain.names) if n in sizes]
+        from_mean = [abs(sizes[n] + self.prior(n)[2] - plain.mean[k]) for k, n in enumerate(plain.names) if n in sizes]
+        most = float(np.max(from_mean / plain.sd[sized], initial=0.0))
+        nearest = min(plain.widths, key=lambda w: abs(np.log(w / most))) if most > 0.0 else 0.0
+        return tuple(w for w in plain.widths if w >= nearest)
 
     def _own_kinds(self, reduced: Reduced, own: np.ndarray) -> list[tuple[float, np.ndarray]]:
         """Share of the largest own form and columns of each kind of own form: along every coordinate, or along one."""

@@ -109,8 +109,10 @@ class Signals:
         self.calm_before = np.concatenate([self.calm[:1], self.calm[:-1]])
         self.direction = np.sign(self.speed)
         moving = np.abs(self.speed) > SLOW
-        # dry friction is known where the rotor moves throughout
-        self.moving = moving & np.roll(moving, 1) & np.roll(moving, -1)
+        # dry friction is known where the rotor moves throughout, one way: a quick reversal has no slow sample
+        self.moving = moving.copy()
+        for beside in (1, -1):
+            self.moving &= np.roll(moving, beside) & (np.roll(self.direction, beside) == self.direction)
         self.moving[0] = False
         # between its two directions a phase rests for a sixth of an electrical turn; its mean current over an interval
         # that may hold more is no measure of torque or power
