@@ -13,7 +13,7 @@ from emafault.diagnosis.forms import FORMS
 from emafault.diagnosis.whitening import Weights
 from emafault.equations.carried import DRIVERS, of_chain, of_form
 from emafault.equations.handover import experiment_text
-from emafault.equations.telling import differing_gains
+from emafault.equations.telling import differing_settings
 from emafault.io.recording import Recording
 from emafault.schema import check_unlisted
 
@@ -241,7 +241,7 @@ def test_a_gain_is_told_beside_what_the_commutations_leave_but_not_beside_what_t
     """What the control law leaves may be a gain's doing; the commutations depend on no gain."""
     gain = {"value": 0.2, "low": 0.19, "high": 0.21, "nominal": 0.25}
     left = {"unit": unit, "equation": "control", "form": "remainder"}
-    found = differing_gains({"controller": {"speed_gain": gain}, "discovered": [left]})
+    found = differing_settings({"controller": {"speed_gain": gain}, "discovered": [left]})
     assert ("speed_gain" in found) is told
 
 

@@ -128,13 +128,17 @@ def _sensors_show(state: State) -> Dual:
     the two phases that are switched on show, each in the direction in which the pair's current is counted."""
     rec = state.rec
     out = Dual(0.0)
-    for j, on in enumerate(rec.once(("counted",), lambda: [_counted(rec, phase) for phase in range(3)])):
+    for j, on in enumerate(counted(rec)):
         out = out + (state.shown[j] - state.current[j]) * (0.5 * on)
     return out
 
 
+def counted(rec) -> list[np.ndarray]:
+    """(sample,) sign in which the current of each phase is the pair's, 0 where it is not switched on."""
+    return rec.once(("counted",), lambda: [_counted(rec, phase) for phase in range(3)])
+
+
 def _counted(rec, j: int) -> np.ndarray:
-    """(sample,) sign in which the current of phase j is the pair's, 0 where it is not switched on."""
     f = np.sin(rec.actuator.pole_pairs * rec.middle - rec.axis[j])
     return np.where(np.abs(f) > np.sin(commutation.EDGE), np.sign(f), 0.0).astype(np.int8)
 
@@ -149,11 +153,15 @@ def _beyond(state: State) -> np.ndarray:
     """
     rec, a = state.rec, state.rec.actuator
     charge = 0.5 * a.inductance * rec.level**2 / _supply(rec, np.sign(state.drive))
-    return rec.once(("edges",), lambda: _edges(rec)) * charge / rec.interval
+    return edges(rec) * charge / rec.interval
+
+
+def edges(rec) -> np.ndarray:
+    """(sample,) number of commutations in each interval."""
+    return rec.once(("edges",), lambda: _edges(rec))
 
 
 def _edges(rec) -> np.ndarray:
-    """(sample,) number of commutations in each interval."""
     edges = np.zeros(rec.size, np.int8)
     for j in range(3):
         low, high, _ = commutation.sweep(rec, j)
@@ -188,7 +196,7 @@ def _at_limit(rec) -> np.ndarray:
     return rec.level > NEAR_LIMIT * rec.actuator.current_limit
 
 
-def _without_headroom(rec) -> np.ndarray:
+def without_headroom(rec) -> np.ndarray:
     """(sample,) where back-EMF and resistance leave the supply too little to drive the current that is asked for."""
     a = rec.actuator
     needed = 2.0 * a.back_emf * np.abs(rec.speed) + a.resistance * (2.0 * rec.level)
@@ -254,7 +262,7 @@ def _usable(rec, sign: np.ndarray) -> np.ndarray:
     width = block_length(rec)
     count = rec.size // width
     moving = rec.moving[: count * width].reshape(count, width).all(axis=1)
-    limited = _at_limit(rec) | _without_headroom(rec) | rec.lost | ~rec.resolved
+    limited = _at_limit(rec) | without_headroom(rec) | rec.lost | ~rec.resolved
     limited = binary_dilation(limited, iterations=odd(SPEED_SPAN / rec.interval))
     free = ~limited[: count * width].reshape(count, width).any(axis=1)
     # through zero the mean of a magnitude is not the magnitude of the mean

@@ -7,7 +7,7 @@ from ..errors import one_line
 from ..plain import escaped
 from ..reporting.written import FROM_DIAGNOSIS
 from .carried import entries, left_out
-from .telling import differing_gains
+from .telling import differing_settings
 
 
 def experiment_text(
@@ -28,7 +28,7 @@ def experiment_text(
 
     rounded = {e: {p: float(f"{v:.8g}") for p, v in values.items()} for e, values in effects.items()}
     named = sorted({e for e in verdict["which"][0]["effects"] if e != "unknown"})
-    unlisted, gains = entries(verdict), differing_gains(verdict)
+    unlisted, settings = entries(verdict), differing_settings(verdict)
     words = [*named, *(["what no catalogue lists"] if unlisted else []), "its unit's tolerances"]
     what = _in_words(words) if len(words) > 1 else f"{words[0]} alone"
     bench = one_line(verdict["bench"])  # a name's line break would end the comment, its ${} be looked up
@@ -37,7 +37,7 @@ def experiment_text(
         "question": escaped(f"How well is the actuator of bench {bench} identified with {what} simulated?"),
         "effects": rounded,
     }
-    own = dict(actuator or {}) | {gain: float(f"{g['value']:.8g}") for gain, g in gains.items()}
+    own = dict(actuator or {}) | {name: float(f"{g['value']:.8g}") for name, g in settings.items()}
     if own:
         content["actuator"] = own
     if unlisted:

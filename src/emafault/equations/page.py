@@ -16,6 +16,7 @@ from ..reporting.retrained import MARK
 from .probabilities import basis
 from .quality import in_cells
 from .sentences import decides, finding, fitted, separated
+from .telling import setting
 
 SHOWN = 4  # fault vectors in the picture
 OPEN = 0.05  # probability from which an effect that is not named is worth a line
@@ -145,16 +146,16 @@ def _add_ladder(page: Page, shrinks: Mapping[str, Any]) -> None:
     )
 
 
-def _add_controller(page: Page, gains: Mapping[str, Mapping[str, Any]]) -> None:
+def _add_controller(page: Page, settings: Mapping[str, Mapping[str, Any]]) -> None:
     page.heading("Controller")
     rows = [
         [
-            n.replace("_", " "), f"{g['nominal']:.4g}", f"{g['value']:.4g}", f"{g['low']:.4g} to {g['high']:.4g}",
+            setting(n), f"{g['nominal']:.4g}", f"{g['value']:.4g}", f"{g['low']:.4g} to {g['high']:.4g}",
             g["units"],
         ]
-        for n, g in gains.items()
+        for n, g in settings.items()
     ]  # fmt: skip
-    page.table(["gain", "nominal", "fitted", "90 % interval", "unit"], rows)
+    page.table(["setting", "nominal", "fitted", "90 % interval", "unit"], rows)
 
 
 def _add_fault_vectors(page: Page, groups: Sequence[Mapping[str, Any]]) -> None:

@@ -55,7 +55,7 @@ def _saturated(rec: Signals) -> Saturated | None:
     drawn = (rec.voltage * rec.current).sum(axis=1) / rec.actuator.bus_voltage
     sag = np.asarray(bus_resistance.sag(lambda _: Dual(1.0), rec, drawn).value)
     worst = WORST * rec.actuator.bus_voltage / rec.actuator.current_limit
-    tried = (_pile(line + R * sag, candidates, noise) for R in np.linspace(0.0, worst, SAGS))
+    tried = (pile(line + R * sag, candidates, noise) for R in np.linspace(0.0, worst, SAGS))
     best = min(tried, key=lambda found: found[0])
     low, high = np.quantile(_needed(rec)[best[1]], [0.1, 0.9])
     if high - low < VARIED * 2.0 * SPREAD * noise:
@@ -68,7 +68,7 @@ def _needed(rec: Signals) -> np.ndarray:
     return 2.0 * (rec.actuator.back_emf * np.abs(rec.speed) + rec.actuator.resistance * rec.level)
 
 
-def _pile(line: np.ndarray, candidates: np.ndarray, noise: float) -> tuple[float, np.ndarray]:
+def pile(line: np.ndarray, candidates: np.ndarray, noise: float) -> tuple[float, np.ndarray]:
     """Log probability of as many values at the top by chance, at most, and (sample,) which these are.
 
     Chernoff's bound of a Poisson count (Mitzenmacher and Upfal 2017, Probability and Computing, theorem 5.4), which

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..diagnosis.naming import NAMED, POSSIBLE
 from .electrical import NAMES
-from .telling import differing_gains
+from .telling import differing_settings, setting
 from .terms import TERMS
 
 
@@ -35,9 +35,8 @@ def finding(verdict: Mapping[str, Any]) -> list[str]:
             f"probability of {NAMED} ({likely}none of them {none:.2g})."
         )
     out += _remainders([d for d in verdict["discovered"] if d["form"] == "remainder"])
-    for name, g in differing_gains(verdict).items():
-        words = name.replace("_", " ")
-        out.append(f"The controller's {words} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
+    for name, g in differing_settings(verdict).items():
+        out.append(f"The controller's {setting(name)} is {g['value']:.3g} {g['units']} and not {g['nominal']:.3g}.")
     signal = verdict["shrinks"]["signal"]
     if signal and signal["closed"] is not None:
         share = 100 * min(signal["closed"], 1.0)

@@ -13,8 +13,10 @@ from .coordinates import SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
-APART = 3.0  # standard deviations from nominal at which a controller's gain is told as different
-TELLING = 0.02  # of a gain: smaller differences are not worth telling
+APART = 3.0  # standard deviations from nominal at which a controller's setting is told as different
+TELLING = 0.02  # of a setting: smaller differences are not worth telling
+OF_LAW = ("speed_gain", "speed_integral_gain", "speed_limit")  # settings that the control equation alone tells
+SETTING = {"hysteresis": "half hysteresis band"}  # words, where the name has others
 WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
 
@@ -98,17 +100,22 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
     }  # fmt: skip
 
 
-def differing_gains(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Gains of the controller, as a verdict has them, that are told as different from the nominal ones."""
+def differing_settings(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Settings of the controller, as a verdict has them, that are told as different from the nominal ones."""
     left = any(d.get("unit") == "remainder:control" for d in verdict["discovered"])
     out = {}
     for name, g in verdict["controller"].items():
-        if left and name != "position_gain":
-            continue  # what nothing describes may be a gain's doing, or take its place
+        if left and name in OF_LAW:
+            continue  # what nothing describes may be their doing, or take their place
         apart, sd = abs(g["value"] - g["nominal"]), (g["high"] - g["low"]) / (2.0 * Z)
         if apart > APART * sd and apart > TELLING * g["nominal"]:
             out[name] = g
     return out
+
+
+def setting(name: str) -> str:
+    """A setting of the controller in words."""
+    return SETTING.get(name, name.replace("_", " "))
 
 
 def place(form: Described) -> str:

@@ -18,7 +18,8 @@ from ..diagnosis.where import where
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
 from ..io.recording import Recording
-from . import carried, telling
+from ..reporting.numbers import TOLD
+from . import carried, regulator, telling
 from .held_out import HeldOut
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
@@ -31,7 +32,7 @@ from .telling_tolerance import told_of_tolerance
 from .terms import TERMS
 
 SCHEMA = "2.0"
-SAMPLED = 0.02  # of a gain: the controller samples what the recordings have means of
+SAMPLED = 0.02  # of a gain or limit: the controller samples what the recordings have means of
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,7 @@ def remainder_sentence(search: Search, equation: str, changes: Mapping[str, floa
 
 
 def _controller(fitted: Fitted) -> dict[str, dict]:
-    """The controller's gains as fitted in the control equation."""
+    """The controller's gains as fitted in the control equation, and those of its limits and its band that show."""
     bench, fit, values = fitted.bench, fitted.fit, fitted.values
     index = fit.normal.index
     n = [x for x in bench.nuisances if x.startswith("controller.")]
@@ -249,12 +250,18 @@ def _controller(fitted: Fitted) -> dict[str, dict]:
     k = np.array([index[x] for x in n])
     prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
     covariance = Definite(fit.normal.H[np.ix_(k, k)] + np.diag(prior)).solve(np.eye(len(k)))
-    out = {}
-    for name, units in GAINS.items():
+    found = {}  # value, standard deviation and unit
+    for name, units in {**GAINS, "speed_limit": "rad/s"}.items():
         full = f"controller.{name}"
-        value, nominal = values[full], bench.parameters[full].off
-        sd = float(np.hypot(np.sqrt(covariance[n.index(full), n.index(full)]), SAMPLED * abs(value)))
-        out[name] = {"value": value, "low": value - Z * sd, "high": value + Z * sd, "units": units, "nominal": nominal}
+        sd = float(np.sqrt(covariance[n.index(full), n.index(full)]))
+        if name in GAINS or sd < TOLD * bench.parameters[full].sd:  # a limit that is not reached does not show
+            found[name] = values[full], sd, units
+    shown = regulator.settings(fitted.machine, bench.recordings, values)
+    found |= {name: (value, sd, "A") for name, (value, sd) in shown.items()}
+    out = {}
+    for name, (value, sd, units) in found.items():
+        half, nominal = Z * float(np.hypot(sd, SAMPLED * abs(value))), getattr(fitted.machine.actuator, name)
+        out[name] = {"value": value, "low": value - half, "high": value + half, "units": units, "nominal": nominal}
     return out
 
 
