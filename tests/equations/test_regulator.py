@@ -6,7 +6,7 @@ import pytest
 
 from emafault.equations import regulator
 
-from .conftest import ACTUATOR, machine_of, recorded
+from .conftest import ACTUATOR, in_steps, machine_of, recorded
 
 QUICK = (("sine", {"amplitude": 0.1, "frequency": 4.0}), ("step", {"amplitude": 0.1, "time": 0.05}))
 SLOW = (("parabolic", {"acceleration": 0.3}), ("reversal", {"amplitude": 0.04, "speed": 0.25}))
@@ -49,3 +49,15 @@ def test_without_currents_at_the_ends_of_intervals_no_band_shows():
     plain = recorded()
     machine = machine_of({"a.nc": replace(plain, phase_current_end=None)})
     assert regulator.settings(machine, ["a.nc"], {n: p.off for n, p in machine.parameters.items()}) == {}
+
+
+def test_currents_in_coarse_steps_show_the_same():
+    steps = {"phase_current": 0.05, "phase_current_end": 0.05}
+    recordings = {
+        f"{n}.nc": in_steps(recorded(c, seed=n, actuator=replace(ACTUATOR, current_limit=15.0), settings=of), steps)
+        for n, (c, of) in enumerate(QUICK)
+    }
+    machine = machine_of(recordings)
+    found = regulator.settings(machine, list(recordings), {n: p.off for n, p in machine.parameters.items()})
+    assert found["current_limit"][0] == pytest.approx(15.0, rel=2e-3)
+    assert found["hysteresis"][0] == pytest.approx(0.4, rel=0.06)

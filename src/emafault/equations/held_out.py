@@ -56,7 +56,7 @@ def held_to_account(
     whose prediction is clearly the worse, or that by these odds is not there, has the odds that the explored recordings
     gave it times the ratio of the predictive densities (Bayes' rule one part of the data after the other), instead of
     those of all data together. What it loses goes to the same set without it, and where its prediction is the worse
-    with a remainder in its place: no other effect has been shown by that. What is named in consequence is held to
+    with a remainder in its place if the confirm recordings clearly confirm that: no other effect has been shown. What is named in consequence is held to
     account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
     whole predicts worse than without its effects, each is tried by itself.
 
@@ -66,7 +66,7 @@ def held_to_account(
     is no odds of its truth (the M-open view: Bernardo and Smith 1994, Bayesian Theory, 6.1.2): there the predictive
     densities of the confirm recordings decide by themselves, beside the prior.
 
-    What has another size in each recording is held to account likewise: see ``constancy``.
+    What has another size in each recording, or another form, is held to account likewise: see ``constancy``.
 
     A described form has been looked for in the explored recordings, and is told only where the others clearly confirm
     it, one of the measuring chain too; so is a remainder, which takes up whatever the model has of the noise wrong, by
@@ -99,13 +99,15 @@ def held_to_account(
         decides = incomplete or ratio < -CLEAR or odds < 0.0
         # of what the explored recordings have no columns they say nothing
         if np.isfinite(explored_odds) and decides and odds < _log_odds(sets.models, told):
-            sets.add_without(effect, ratio < -CLEAR, sets.log_mass(told) - odds)
+            left = ratio < -CLEAR and account.instead(effect) >= CLEAR
+            sets.add_without(effect, left, sets.log_mass(told) - odds)
         sets.add_dispersed(effect, told)
         leading = sets.leading(effect)
         change = log_odds_of_change(bench, fit, leading, effect)
         changes |= dict.fromkeys(told, change)
         other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
-        sets.add_without(effect, True, sets.log_mass(told) + other)
+        left = other < -CLEAR or account.instead(effect) >= CLEAR
+        sets.add_without(effect, left, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
     return models, HeldOut(explored, ratios, changes, account.leading)

@@ -54,12 +54,14 @@ class _Pair:
 
 
 def _scatter(pairs: Sequence[_Pair]) -> float:
-    """Standard deviation (A) of a mean of the pair's current: of sensors and of the ripple's part in it."""
+    """Standard deviation (A) of a mean of the pair's current: of the ripple's part in it and of the sensors, whose
+    rounding most differences do not show."""
     bent = [np.diff(p.change)[p.joined[:-1] & p.joined[1:]] for p in pairs]
     bent_of_all = np.concatenate(bent)
     if len(bent_of_all) < FEWEST:
         return np.nan
-    return float(np.median(np.abs(bent_of_all)) / 0.6745 / np.sqrt(6.0))
+    seen = float(np.median(np.abs(bent_of_all)) / 0.6745 / np.sqrt(6.0))
+    return max(seen, pairs[0].rec.noise.current / np.sqrt(2.0))
 
 
 def _limit(
