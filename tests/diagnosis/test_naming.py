@@ -107,8 +107,11 @@ def held(
     change=-50.0,
     dispersion=1.0,
     wandering=(),
+    left=40.0,
 ):
-    """What held-out misfits, by set, make of the sets of all recordings and of the explored ones."""
+    """What held-out misfits, by set, make of the sets of all recordings and of the explored ones; ``left``: that of a
+    remainder in the place of a name."""
+    misfit = {("remainder:torque",): left, **misfit}
     units = {
         "load_spring": unit("load_spring", "torque"), "load": unit("load", "torque"),
         "~order": unit("~order", "torque", kind="form"),
@@ -125,7 +128,8 @@ def held(
     )  # fmt: skip
     search = SimpleNamespace(
         fit=lambda members: model(-2.0, *(u for u, _ in members)),
-        less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)), units=units,
+        less=lambda m, out: model(-2.0, *(u for u in m.units if u != out)),
+        candidates={("remainder:torque", 0): None}, units=units,
     )  # fmt: skip
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
     monkeypatch.setattr(held_out, "_misfit", lambda explored, m, out="": misfit[tuple(u for u in m.units if u != out)])
@@ -142,6 +146,9 @@ def test_a_name_that_predicts_the_held_out_part_worse_loses_its_odds(monkeypatch
     explored = [model(0.0, "load_spring"), model(-2.0)]
     kept, ratios, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": -15.0} and kept[0].units == ("remainder:torque",)
+    # the confirm recordings have to speak for a remainder as well
+    kept, _, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"], left=96.0)
+    assert kept[0].units == ()
     misfit["load_spring",] = 80.0
     kept, ratios, _ = held(monkeypatch, misfit, whole, explored, ["load_spring"])
     assert ratios == {"load_spring": 10.0} and kept[0].units == ("load_spring",)

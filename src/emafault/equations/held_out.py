@@ -56,9 +56,9 @@ def held_to_account(
     whose prediction is clearly the worse, or that by these odds is not there, has the odds that the explored recordings
     gave it times the ratio of the predictive densities (Bayes' rule one part of the data after the other), instead of
     those of all data together. What it loses goes to the same set without it, and where its prediction is the worse
-    with a remainder in its place if the confirm recordings clearly confirm that: no other effect has been shown. What is named in consequence is held to
-    account in turn, and so is a group, for which its likeliest member stands. Where the explored recordings' set as a
-    whole predicts worse than without its effects, each is tried by itself.
+    with a remainder in its place if the confirm recordings clearly confirm that: no other effect has been shown. What
+    is named in consequence is held to account in turn, and so is a group, for which its likeliest member stands. Where
+    the explored recordings' set as a whole predicts worse than without its effects, each is tried by itself.
 
     Where there is a remainder (one of the controller's equations: for what acts there), or what is left wanders
     (``wandering``: by equation, log odds that it does), or in an effect's equation a form or a remainder was seen that
