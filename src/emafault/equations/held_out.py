@@ -102,6 +102,7 @@ def held_to_account(
             left = ratio < -CLEAR and account.instead(effect) >= CLEAR
             sets.add_without(effect, left, sets.log_mass(told) - odds)
         sets.add_dispersed(effect, told)
+        sets.add_at_their_own(effect, told)
         leading = sets.leading(effect)
         change = log_odds_of_change(bench, fit, leading, effect)
         changes |= dict.fromkeys(told, change)
@@ -211,6 +212,22 @@ class _Sets:
         """Takes a unit out of all sets, with or without a remainder in its place."""
         self.add_without(unit, left, self.log_mass((unit,)))
         self.models = [m for m in self.models if unit not in m.units]
+
+    def add_at_their_own(self, unit: str, told: Collection[str]) -> None:
+        """Adds the likely sets with a unit, each less that one, with the odds of the likeliest at its own optimum to that
+        without the unit at its own, where the fit ended at another set, with what is not told.
+
+        What the linear model has of both is said of a point that need be near neither.
+        """
+        leading, bench = self.leading(unit), self.bench
+        if leading.units == self.fit.models[0].units:
+            return
+        begun, ends = bench.here(), []
+        for model in (leading, self.fit.search.less(leading, unit)):
+            bench.move(model, self.fit.normal)
+            ends.append(bench.settle(Model(model.choices)).log_posterior)
+            bench.go_to(begun)
+        self.add_without(unit, False, self.log_mass(told) - (ends[0] - ends[1]))
 
     def add_dispersed(self, unit: str, told: Collection[str]) -> None:
         """Adds the likely sets with a unit, each less that one, with what is ``told`` loses where its score is
