@@ -229,3 +229,29 @@ def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
         assert account.ratio("~function") == ratio
     account.let_go_absent([one])
     assert account.ratio("~frequency") == 400.0  # asked after all, it is there again
+
+
+@pytest.mark.parametrize(("own", "named"), [(-3.0, False), (9.0, True)])
+def test_beside_what_is_not_told_any_more_an_effect_is_compared_at_its_own_optimum(own, named):
+    """The linear model's point is that of the set with all of it."""
+    units = {
+        "~function": Unit("~function", "form", ("torque",), []),
+        "inertia": Unit("inertia", "structural", ("torque",), []),
+    }
+    search = searching(units)
+    search.less = lambda model, out: search.fit([(u, 0) for u in model.units if u != out])
+    with_all, with_it = search.fit([(u, 0) for u in units]), search.fit([("inertia", 0)])
+    places = []
+    bench = SimpleNamespace(
+        here=lambda: "begun", go_to=places.append, move=lambda model, normal: None,
+        settle=lambda model: Model(model.choices, own if "inertia" in model.units else 0.0),
+    )  # fmt: skip
+    sets = held_out._Sets(bench, SimpleNamespace(models=[with_all], search=search, normal=None))
+    sets.models = [with_it]
+    sets.add_at_their_own("inertia", ("inertia",))
+    likeliest = max(sets.models, key=lambda m: m.log_posterior)
+    assert ("inertia" in likeliest.units) == named and places == ["begun", "begun"]
+    assert sets.log_mass(("inertia",)) - max(m.log_posterior for m in sets.models if not m.units) == pytest.approx(own)
+    sets.models = [with_all]  # where the fit ended
+    sets.add_at_their_own("inertia", ("inertia",))
+    assert sets.models == [with_all]

@@ -5,8 +5,10 @@ from dataclasses import replace
 import pytest
 
 from emafault.equations import regulator
+from emafault.equations.machine import ReferenceActuator
+from emafault.equations.signals import Signals, estimated_noise
 
-from .conftest import ACTUATOR, in_steps, machine_of, recorded
+from .conftest import ACTUATOR, NOISE, in_steps, machine_of, recorded
 
 QUICK = (("sine", {"amplitude": 0.1, "frequency": 4.0}), ("step", {"amplitude": 0.1, "time": 0.05}))
 SLOW = (("parabolic", {"acceleration": 0.3}), ("reversal", {"amplitude": 0.04, "speed": 0.25}))
@@ -57,7 +59,8 @@ def test_currents_in_coarse_steps_show_the_same():
         f"{n}.nc": in_steps(recorded(c, seed=n, actuator=replace(ACTUATOR, current_limit=15.0), settings=of), steps)
         for n, (c, of) in enumerate(QUICK)
     }
-    machine = machine_of(recordings)
+    noise = estimated_noise(list(recordings.values()), NOISE)
+    machine = ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, noise) for n, r in recordings.items()})
     found = regulator.settings(machine, list(recordings), {n: p.off for n, p in machine.parameters.items()})
     assert found["current_limit"][0] == pytest.approx(15.0, rel=2e-3)
     assert found["hysteresis"][0] == pytest.approx(0.4, rel=0.06)

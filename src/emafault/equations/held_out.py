@@ -214,10 +214,9 @@ class _Sets:
         self.models = [m for m in self.models if unit not in m.units]
 
     def add_at_their_own(self, unit: str, told: Collection[str]) -> None:
-        """Adds the likely sets with a unit, each less that one, with the odds of the likeliest at its own optimum to that
-        without the unit at its own, where the fit ended at another set, with what is not told.
-
-        What the linear model has of both is said of a point that need be near neither.
+        """Adds the likely sets with a unit, each less that one, by the odds of the likeliest at its own optimum to the
+        same set without the unit at its own, where the fit ended at another set, with what is not told: the linear
+        model is one of that set's point.
         """
         leading, bench = self.leading(unit), self.bench
         if leading.units == self.fit.models[0].units:
