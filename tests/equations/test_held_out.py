@@ -1,5 +1,6 @@
 """What a misfit on recordings set aside is compared with."""
 
+from functools import partial
 from itertools import islice
 from types import SimpleNamespace
 
@@ -246,6 +247,7 @@ def test_beside_what_is_not_told_any_more_an_effect_is_compared_at_its_own_optim
         here=lambda: "begun", go_to=places.append, move=lambda model, normal: None,
         settle=lambda model: Model(model.choices, own if "inertia" in model.units else 0.0),
     )  # fmt: skip
+    bench.at_its_own = partial(Bench.at_its_own, bench)
     sets = held_out._Sets(bench, SimpleNamespace(models=[with_all], search=search, normal=None))
     sets.models = [with_it]
     sets.add_at_their_own("inertia", ("inertia",))

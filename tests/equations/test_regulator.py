@@ -14,15 +14,21 @@ QUICK = (("sine", {"amplitude": 0.1, "frequency": 4.0}), ("step", {"amplitude": 
 SLOW = (("parabolic", {"acceleration": 0.3}), ("reversal", {"amplitude": 0.04, "speed": 0.25}))
 
 
-def shown(commands, interval=2e-4, **settings):
-    """What is shown of a controller with other settings than the nominal one."""
+def shown(commands, steps=None, **settings):
+    """What recordings, in coarse steps or not, show of a controller with other settings than the nominal one."""
     unit = replace(ACTUATOR, **settings)
     recordings = {
-        f"{n}.nc": recorded(c, seed=n, actuator=unit, settings=of, interval=interval)
+        f"{n}.nc": in_steps(recorded(c, seed=n, actuator=unit, settings=of), steps or {})
         for n, (c, of) in enumerate(commands)
     }
-    machine = machine_of(recordings)
-    return regulator.settings(machine, list(recordings), {n: p.off for n, p in machine.parameters.items()})
+    noise = estimated_noise(list(recordings.values()), NOISE)
+    return of_machine(
+        ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, noise) for n, r in recordings.items()})
+    )
+
+
+def of_machine(machine):
+    return regulator.settings(machine, list(machine.recordings), {n: p.off for n, p in machine.parameters.items()})
 
 
 @pytest.mark.parametrize("limit", [10.0, 15.0])
@@ -48,19 +54,10 @@ def test_the_band_shows_in_currents_at_the_ends_of_intervals(half_band, commands
 
 
 def test_without_currents_at_the_ends_of_intervals_no_band_shows():
-    plain = recorded()
-    machine = machine_of({"a.nc": replace(plain, phase_current_end=None)})
-    assert regulator.settings(machine, ["a.nc"], {n: p.off for n, p in machine.parameters.items()}) == {}
+    assert of_machine(machine_of({"a.nc": replace(recorded(), phase_current_end=None)})) == {}
 
 
 def test_currents_in_coarse_steps_show_the_same():
-    steps = {"phase_current": 0.05, "phase_current_end": 0.05}
-    recordings = {
-        f"{n}.nc": in_steps(recorded(c, seed=n, actuator=replace(ACTUATOR, current_limit=15.0), settings=of), steps)
-        for n, (c, of) in enumerate(QUICK)
-    }
-    noise = estimated_noise(list(recordings.values()), NOISE)
-    machine = ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, noise) for n, r in recordings.items()})
-    found = regulator.settings(machine, list(recordings), {n: p.off for n, p in machine.parameters.items()})
+    found = shown(QUICK, {"phase_current": 0.05, "phase_current_end": 0.05}, current_limit=15.0)
     assert found["current_limit"][0] == pytest.approx(15.0, rel=2e-3)
     assert found["hysteresis"][0] == pytest.approx(0.4, rel=0.06)

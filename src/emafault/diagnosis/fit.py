@@ -326,20 +326,13 @@ class Bench(Describing):
                         rivals.append((unit, m[0], found))
         if not rivals:
             return
-        begun = self.here()
-
-        def at_its_own(model: Model) -> float:
-            self.go_to(begun)
-            self.move(model, normal)
-            return self.settle(Model(model.choices)).log_posterior
-
-        leading = at_its_own(best)
+        leading = self.at_its_own(best, normal).log_posterior
         for unit, rival, model in rivals:
-            error = at_its_own(model) - leading - (model.log_posterior - best.log_posterior)
+            own = self.at_its_own(model, normal).log_posterior
+            error = own - leading - (model.log_posterior - best.log_posterior)
             for other in search.seen.values():
                 if rival in other.units and unit not in other.units:
                     other.log_posterior += error
-        self.go_to(begun)
 
     def _listed_instead(self, search: Search, best: Model) -> list[Model]:
         """A set with each of the likeliest listed effects in the place of each of its described forms.

@@ -113,6 +113,14 @@ class Settling(NormalEquations):
             found.log_posterior -= ahead
         return found
 
+    def at_its_own(self, model: Model, normal: Normal) -> Model:
+        """A set at its own optimum, from where the linear model of the present point has it; the point stays."""
+        begun = self.here()
+        self.move(model, normal)
+        found = self.settle(Model(model.choices))
+        self.go_to(begun)
+        return found
+
     def _nearer(
         self, model: Model, corrected: bool, began: Began | None
     ) -> tuple[Model, Normal, tuple[float, float | None]]:

@@ -107,6 +107,7 @@ def held_to_account(
         change = log_odds_of_change(bench, fit, leading, effect)
         changes |= dict.fromkeys(told, change)
         other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
+        # of the little that is lost otherwise it need not be asked
         left = other < -CLEAR or account.instead(effect) >= CLEAR
         sets.add_without(effect, left, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
@@ -218,15 +219,12 @@ class _Sets:
         same set without the unit at its own, where the fit ended at another set, with what is not told: the linear
         model is one of that set's point.
         """
-        leading, bench = self.leading(unit), self.bench
+        leading = self.leading(unit)
         if leading.units == self.fit.models[0].units:
             return
-        begun, ends = bench.here(), []
-        for model in (leading, self.fit.search.less(leading, unit)):
-            bench.move(model, self.fit.normal)
-            ends.append(bench.settle(Model(model.choices)).log_posterior)
-            bench.go_to(begun)
-        self.add_without(unit, False, self.log_mass(told) - (ends[0] - ends[1]))
+        both = leading, self.fit.search.less(leading, unit)
+        inside, less = (self.bench.at_its_own(model, self.fit.normal).log_posterior for model in both)
+        self.add_without(unit, False, self.log_mass(told) - (inside - less))
 
     def add_dispersed(self, unit: str, told: Collection[str]) -> None:
         """Adds the likely sets with a unit, each less that one, with what is ``told`` loses where its score is

@@ -14,12 +14,12 @@ from ..diagnosis.sets import Choice, Model
 from ..io.recording import Recording
 from . import electrical
 from .held_out import Explored, HeldOut
-from .parameters import FAULTS, GAINS
+from .parameters import FAULTS, OF_LAW
 from .point import SEEDED
 from .telling import Z
 
 #: what the controller's owner may set is no part of a gap, and recordings set aside may tell what the others do not
-CONTROLLER_SETTINGS = [f"controller.{name}" for name in (*GAINS, "speed_limit")]
+CONTROLLER_SETTINGS = [f"controller.{name}" for name in OF_LAW]
 
 
 def null(bench: Bench, fit: Fit) -> Bench:

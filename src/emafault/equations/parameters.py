@@ -39,6 +39,7 @@ IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_spe
 GAINED = ("current", "voltage", "output")  # quantities whose gain may be off
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
+OF_LAW = {**GAINS, "speed_limit": "rad/s"}  # what the control equation has of the controller
 #: of what an effect is fitted in that its catalogue does not have
 UNITS = {"flexibility": "rad/(N m)"}
 
@@ -56,7 +57,7 @@ def nuisances(
                 out[full] = Parameter(
                     full, centre, centre, p.tolerance * abs(centre), p.units, vanishes=_vanishes(centre)
                 )
-    for name, units in {**GAINS, "speed_limit": "rad/s"}.items():
+    for name, units in OF_LAW.items():
         at = getattr(a, name)
         out[f"controller.{name}"] = Parameter(f"controller.{name}", at, at, GAIN_PRIOR * at, units)
     full = "controller.commutation_time"

@@ -29,7 +29,10 @@ def settings(
     values : of all parameters, by which the control law asks for a current
     """
     pairs = [_Pair(machine.recordings[n]) for n in recordings]
-    found = {"current_limit": _limit(machine, pairs, values), "hysteresis": _half_band(pairs)}
+    scatter = _scatter(pairs)
+    if not scatter:
+        return {}
+    found = {"current_limit": _limit(machine, pairs, values, scatter), "hysteresis": _half_band(pairs, scatter)}
     return {name: f for name, f in found.items() if f is not None}
 
 
@@ -53,25 +56,21 @@ class _Pair:
             self.ends = (at_end[:-1] - 0.5 * (self.current[:-1] + self.current[1:]))[self.joined]
 
 
-def _scatter(pairs: Sequence[_Pair]) -> float:
+def _scatter(pairs: Sequence[_Pair]) -> float | None:
     """Standard deviation (A) of a mean of the pair's current: of the ripple's part in it and of the sensors, whose
-    rounding most differences do not show."""
-    bent = [np.diff(p.change)[p.joined[:-1] & p.joined[1:]] for p in pairs]
-    bent_of_all = np.concatenate(bent)
-    if len(bent_of_all) < FEWEST:
-        return np.nan
-    seen = float(np.median(np.abs(bent_of_all)) / 0.6745 / np.sqrt(6.0))
+    rounding most differences do not show; None where there are too few."""
+    bent = np.concatenate([np.diff(p.change)[p.joined[:-1] & p.joined[1:]] for p in pairs])
+    if len(bent) < FEWEST:
+        return None
+    seen = float(np.median(np.abs(bent)) / 0.6745 / np.sqrt(6.0))
     return max(seen, pairs[0].rec.noise.current / np.sqrt(2.0))
 
 
 def _limit(
-    machine: ReferenceActuator, pairs: Sequence[_Pair], values: Mapping[str, float]
+    machine: ReferenceActuator, pairs: Sequence[_Pair], values: Mapping[str, float], scatter: float
 ) -> tuple[float, float] | None:
-    scatter = _scatter(pairs)
     level = np.concatenate([np.abs(p.current) for p in pairs])
     known = np.concatenate([p.known for p in pairs])
-    if not scatter > 0.0 or not known.any():
-        return None
     log_chance, piled = pile(level, known, scatter)
     if log_chance > np.log(CHANCE):
         return None
@@ -91,8 +90,7 @@ def _limit(
     return float(np.median(level[piled])), float(scatter / np.sqrt(piled.sum()))
 
 
-def _half_band(pairs: Sequence[_Pair]) -> tuple[float, float] | None:
-    scatter = _scatter(pairs)
+def _half_band(pairs: Sequence[_Pair], scatter: float) -> tuple[float, float] | None:
     even = [p.ends[np.abs(p.change[p.joined]) < SPREAD * np.sqrt(2.0) * scatter] for p in pairs if p.ends is not None]
     ends = np.concatenate([np.zeros(0), *even])
     if len(ends) < FEWEST:

@@ -15,7 +15,7 @@ EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
 APART = 3.0  # standard deviations from nominal at which a controller's setting is told as different
 TELLING = 0.02  # of a setting: smaller differences are not worth telling
-OF_LAW = ("speed_gain", "speed_integral_gain", "speed_limit")  # settings that the control equation alone tells
+SHARED = ("speed_gain", "speed_integral_gain", "speed_limit")  # settings that a remainder of the control law may have
 SETTING = {"hysteresis": "half hysteresis band"}  # words, where the name has others
 WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
 
@@ -105,7 +105,7 @@ def differing_settings(verdict: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     left = any(d.get("unit") == "remainder:control" for d in verdict["discovered"])
     out = {}
     for name, g in verdict["controller"].items():
-        if left and name in OF_LAW:
+        if left and name in SHARED:
             continue  # what nothing describes may be their doing, or take their place
         apart, sd = abs(g["value"] - g["nominal"]), (g["high"] - g["low"]) / (2.0 * Z)
         if apart > APART * sd and apart > TELLING * g["nominal"]:

@@ -23,7 +23,7 @@ from . import carried, regulator, telling
 from .held_out import HeldOut
 from .how_far import null, shrinks
 from .machine import ReferenceActuator
-from .parameters import BEYOND, GAINS
+from .parameters import BEYOND, GAINS, OF_LAW
 from .point import SEEDED
 from .quality import at_a_glance, told
 from .telling import EQUATION, Z
@@ -251,7 +251,7 @@ def _controller(fitted: Fitted) -> dict[str, dict]:
     prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])
     covariance = Definite(fit.normal.H[np.ix_(k, k)] + np.diag(prior)).solve(np.eye(len(k)))
     found = {}  # value, standard deviation and unit
-    for name, units in {**GAINS, "speed_limit": "rad/s"}.items():
+    for name, units in OF_LAW.items():
         full = f"controller.{name}"
         sd = float(np.sqrt(covariance[n.index(full), n.index(full)]))
         if name in GAINS or sd < TOLD * bench.parameters[full].sd:  # a limit that is not reached does not show
