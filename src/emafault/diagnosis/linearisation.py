@@ -58,7 +58,7 @@ class Linearisation:
 
     def __init__(self, machine):
         self.machine = machine
-        self.kept: dict[str, list[Block]] = {}
+        self.kept: dict[str, tuple[list[Block], list[Block]]] = {}  # and of one more draw of the noise
         self.carried: dict[str, Carried] = {}
 
     def compress(self, task: Task, recording: str, given: Carried | None) -> tuple[list[White], Carried | None]:
@@ -67,9 +67,10 @@ class Linearisation:
         ``given``: its weights; None: as they were the last time.
         """
         weights = self.carried[recording] if given is None else given
-        blocks = self.kept.pop(recording) if recording in self.kept else self._blocks(task, recording)
-        if task.again and sum(map(_size, self.kept.values())) + _size(blocks) < KEPT:
-            self.kept[recording] = blocks
+        blocks, disturbed = self.kept.pop(recording) if recording in self.kept else self._blocks(task, recording)
+        held = sum(_size(b) for both in self.kept.values() for b in both)
+        if task.again and held + _size(blocks) + _size(disturbed) < KEPT:
+            self.kept[recording] = blocks, disturbed
         renewed: Carried = {}
         out = []
         for b in blocks:
@@ -84,7 +85,6 @@ class Linearisation:
         if task.full is not None:
             weights = renewed
         if task.corrected:
-            disturbed = self.machine.blocks(task.values, recording, disturbed=True, wanted=task.columns)
             for white, block, other in zip(out, blocks, disturbed, strict=True):
                 own = task.own if block.equation not in SETTINGS else None
                 correct(white, disturbance(block, other, white.names, weights.get(block.equation), own))
@@ -123,8 +123,11 @@ class Linearisation:
         block.coordinates["drivers"] = np.ones((1, rows))
         cells.cells(lambda b: np.zeros(rows, int), 1, 0)
 
-    def _blocks(self, task: Task, recording: str) -> list[Block]:
-        return self.machine.blocks(task.values, recording, wanted=task.columns)
+    def _blocks(self, task: Task, recording: str) -> tuple[list[Block], list[Block]]:
+        """Blocks of a recording, and with one more draw of its noise where that is to be taken out."""
+        wanted = task.columns
+        blocks = self.machine.blocks(task.values, recording, wanted=wanted)
+        return blocks, self.machine.blocks(task.values, recording, True, wanted) if task.corrected else []
 
 
 def _size(blocks: list[Block]) -> int:

@@ -52,7 +52,7 @@ class NormalEquations(Point):
             return self._each(replace(task, full=leading, leads=True), self.recordings)
         if not renew:
             return self._each(task, self.recordings)
-        whites = self._each(replace(task, again=True, corrected=False), self.recordings)
+        whites = self._each(replace(task, again=True), self.recordings)
         full = full_model(whites, self._full_prior(*self._columns_of(model)))
         return self._each(replace(task, full=full), self.recordings)
 
