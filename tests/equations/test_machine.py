@@ -1,5 +1,7 @@
 """The reference actuator as the diagnosis sees it: its priors, and that a fit stands still at its optimum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,11 +9,13 @@ from emafault.actuator.shape import trapezoid_swept
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.linear import disturbance, raw_columns
 from emafault.effects import EFFECTS
-from emafault.equations import commutation, waveform
+from emafault.equations import commutation, electrical, waveform
 from emafault.equations.coordinates import OWN_ALONG
+from emafault.equations.machine import ReferenceActuator
 from emafault.equations.point import Point, State
+from emafault.equations.signals import Signals
 
-from .conftest import machine_of, recorded
+from .conftest import ACTUATOR, NOISE, machine_of, recorded
 
 FAULT = (0.05, 0.03, 0.06, 0.02, 0.01, 20.0)
 
@@ -106,6 +110,20 @@ def test_a_fit_stands_still_at_its_optimum():
         steps.append(max(abs(deviations[n]) / bench.prior(n)[1] for n in turns))
         bench.move(found, normal)
     assert max(steps[2:]) < 1e-5, steps
+
+
+def test_a_full_model_does_not_take_noise_for_what_its_columns_explain():
+    """All terms of a voltage times one factor leave it as wrong as before but for their noise: where that is most of
+    what is left, a fit that does not take it out of its columns shrinks them, and so the noise that is weighed by."""
+    noisy = replace(NOISE, angle=10.0 * NOISE.angle)
+    named = {f"r{n}": recorded(c, seed=n, noise=noisy) for n, c in enumerate(("parabolic", "reversal", "sine"))}
+    machine = ReferenceActuator(ACTUATOR, {n: Signals.of(n, r, ACTUATOR, noisy) for n, r in named.items()})
+    bench = Bench(machine, list(named))
+    bench.settle(NOTHING)
+    bench.linearise(renew=True)
+    for weights in bench.carried.values():
+        for phase in electrical.NAMES:
+            assert np.median(weights[phase].variance) > 0.5, phase
 
 
 def test_an_edge_at_the_end_of_an_interval_is_no_corner(nominal):

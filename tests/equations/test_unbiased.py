@@ -176,6 +176,28 @@ def test_a_large_wave_of_the_recorded_angle_is_undone_in_every_equation():
         assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.95, equation
 
 
+@pytest.mark.parametrize(("signal", "size"), [("current_a", 0.1), ("voltage", 0.5)])
+def test_a_wrong_signal_of_a_faulty_unit_is_undone_in_every_equation(signal, size):
+    """What equations make of a signal depends on the unit: phase a has 0.1 fewer turns, and the winding is warm."""
+    fault = (0.1, 0.0, 0.0, 0.0, 0.0, 40.0)
+    recording = recorded("parabolic", fault=fault, health="seeded", noise=QUIET)
+    wrong = size * (1.0 - np.exp(-(recording.time - recording.time[0]) / 0.2))[:, None]
+    unit = np.array([1.0, 0.0, 0.0]) if signal == "current_a" else np.ones(3)
+    more = ("phase_current", "phase_current_end") if signal == "current_a" else ("phase_voltage",)
+    seen = replace(recording, **{n: getattr(recording, n) + wrong * unit for n in more})
+    shape = (("source", 2.0, 0.0, ""), ("time_constant", 0.2, 0.0, "s"))
+    form = Described("~m", "memory", f"sensor_{signal[:7]}", 0, shape, 1.0, 1.0, "electrical_a", signal)
+    machine = with_forms(machine_of({"a.nc": seen}), [form])
+    at = truth(machine, recording, fault=fault) | {"form.~m.gain": size}
+    wanted = {"form.~m.gain"}
+    for block in machine.blocks(at, "a.nc", wanted=wanted):
+        if block.equation in ("electrical_a", "electrical_b", "torque", "sensor_current") and block.columns:
+            column, left = whiten(
+                block.bands, block.usable, np.column_stack([block.columns["form.~m.gain"], block.residual])
+            ).T
+            assert abs(column @ left) / np.sqrt(column @ column) < 4.0, block.equation
+
+
 def test_runs_without_end_currents_have_no_period():
     """Ends at regular phases would alias the ripple into a wave at constant speed."""
     recording = replace(recorded("parabolic", interval=5e-5), phase_current_end=None)

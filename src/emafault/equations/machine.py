@@ -46,7 +46,8 @@ class ReferenceActuator:
     name = "actuator"
     #: channel and equation, what shows of one in the other depends on the point
     moving = (("angle", "commutation"), ("angle", "sensor_speed"))
-    bending = ("angle",)  # channels that equations are not linear in
+    #: channels whose forms are taken off the recorded signals: what equations make of them depends on the point
+    bending = ("angle", "current_a", "current_b", "current_c", "voltage", "output")
 
     def __init__(
         self,

@@ -1,13 +1,14 @@
 """What builds up with a time constant, from nothing at each recording's start: driven by loss or by speed, or as
 what warms up once it is switched on."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...first_order import followed
-from ..left import Found, Left, Shape, beside_first, likeliest, singly
+from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
+from .spectrum import refined_scale
 
 AXIS = "what has built up"  # of its picture
 ALONG = "time"
@@ -17,7 +18,6 @@ CHANNELS: tuple[str, ...] = ("current", "voltage", "output")  # of the measuring
 COEFFICIENTS = ("gain",)
 SOURCES = ("loss", "speed", "start")  # current squared (A2), magnitude of the speed (100 rad/s), one
 CONSTANTS = np.geomspace(0.05, 1.0, 6)  # of the longest recording
-FINER = np.geomspace(0.6, 1.0 / 0.6, 7)
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
@@ -65,12 +65,14 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The time constant."""
-    tried = [(int(shape["source"]), float(shape["time_constant"] * f)) for f in FINER]
-    values = _values(left, driver, tried)
-    k, spread = likeliest(values, np.array([c for _, c in tried]))
-    at = tried[k][1]
-    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, spread + 0.05 * at, "s"))
-    return [Found(found, float(values[k]), float(len(SOURCES) * len(CONSTANTS)))]
+    source = int(shape["source"])
+
+    def likelihood(constants: Sequence[float]) -> list[float]:
+        return _values(left, driver, [(source, c) for c in constants]).tolist()
+
+    at, deviation, value = refined_scale(shape["time_constant"], CONSTANTS[1] / CONSTANTS[0], likelihood)
+    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, deviation, "s"))
+    return [Found(found, value, float(len(SOURCES) * len(CONSTANTS)))]
 
 
 def told(values: np.ndarray) -> dict[str, float]:
