@@ -1,12 +1,11 @@
 """A power of the speed, as the drag of a fan or of oil that is stirred has it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from ..left import Found, Left, Shape, beside_first, of_cells, singly
+from ..left import Found, Left, Shape, beside_first, likeliest, of_cells, singly
 from ..model import Block
-from .spectrum import refined_scale
 
 AXIS = "rotor speed (rad/s)"  # of its picture
 ALONG = "rotor_speed"
@@ -15,6 +14,7 @@ POSITIVE = ("exponent",)
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("at_100_rad_s",)
 EXPONENTS = (0.5, 1.5, 2.0, 3.0)  # between them are the constant and the slope that every machine has
+FINER = np.geomspace(0.8, 1.25, 9)
 CELLS = 40  # of the range of speeds
 REFERENCE = 100.0  # rad/s
 
@@ -44,15 +44,16 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The exponent."""
+    tried = shape["exponent"] * FINER
 
-    def likelihood(exponents: Sequence[float]) -> list[float]:
-        def of(b: Block) -> np.ndarray:
-            return np.vstack([np.ones(len(b.residual)), _powers(np.abs(b.coordinates["rotor_speed"]), exponents)])
+    def of(b: Block) -> np.ndarray:
+        return np.vstack([np.ones(len(b.residual)), _powers(np.abs(b.coordinates["rotor_speed"]), tried)])
 
-        return singly(*beside_first(*left.products(of, driver))).tolist()
-
-    at, deviation, value = refined_scale(shape["exponent"], EXPONENTS[2] / EXPONENTS[1], likelihood)
-    return [Found((("exponent", at, deviation, "1"),), value, float(len(EXPONENTS)))]
+    values = singly(*beside_first(*left.products(of, driver)))
+    k, spread = likeliest(values, tried)
+    return [
+        Found((("exponent", float(tried[k]), spread + 0.02 * tried[k], "1"),), float(values[k]), float(len(EXPONENTS)))
+    ]
 
 
 def told(values: np.ndarray) -> dict[str, float]:
