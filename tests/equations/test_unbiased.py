@@ -189,13 +189,14 @@ def test_a_wrong_signal_of_a_faulty_unit_is_undone_in_every_equation(signal, siz
     form = Described("~m", "memory", f"sensor_{signal[:7]}", 0, shape, 1.0, 1.0, "electrical_a", signal)
     machine = with_forms(machine_of({"a.nc": seen}), [form])
     at = truth(machine, recording, fault=fault) | {"form.~m.gain": size}
-    wanted = {"form.~m.gain"}
-    for block in machine.blocks(at, "a.nc", wanted=wanted):
-        if block.equation in ("electrical_a", "electrical_b", "torque", "sensor_current") and block.columns:
-            column, left = whiten(
-                block.bands, block.usable, np.column_stack([block.columns["form.~m.gain"], block.residual])
-            ).T
-            assert abs(column @ left) / np.sqrt(column @ column) < 4.0, block.equation
+    shown = {"current_a": (*electrical.NAMES, "torque", "sensor_current"), "voltage": electrical.NAMES}[signal]
+    blocks = {b.equation: b for b in machine.blocks(at, "a.nc", wanted={"form.~m.gain"})}
+    for equation in shown:
+        block = blocks[equation]
+        column, left = whiten(
+            block.bands, block.usable, np.column_stack([block.columns["form.~m.gain"], block.residual])
+        ).T
+        assert abs(column @ left) / np.sqrt(column @ column) < 4.0, equation
 
 
 def test_runs_without_end_currents_have_no_period():

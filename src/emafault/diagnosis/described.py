@@ -107,11 +107,11 @@ class WithForms:
         return blocks
 
     def _undone(self, values: Mapping[str, float], recording: str) -> dict[str, np.ndarray]:
-        """By channel that equations are not linear in, what the forms' present coefficients say is wrong of it."""
+        """By channel whose forms are taken off its signal, what their present coefficients say is wrong of it."""
         out: dict[str, np.ndarray] = {}
         for form in self.forms:
             here = np.array([values.get(n, 0.0) for n in form.names(recording)])
-            if here.any() and form.channel in getattr(self.machine, "bending", ()):
+            if here.any() and form.channel in getattr(self.machine, "undone", ()):
                 x = here @ FORMS[form.word].columns(self.machine.sampled(recording, form.channel), form.values)
                 out[form.channel] = out.get(form.channel, 0.0) + x
         return out

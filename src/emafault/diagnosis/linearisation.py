@@ -58,7 +58,7 @@ class Linearisation:
 
     def __init__(self, machine):
         self.machine = machine
-        self.kept: dict[str, tuple[list[Block], list[Block]]] = {}  # and of one more draw of the noise
+        self.kept: dict[str, tuple[list[Block], list[Block]]] = {}  # by recording, see ``_blocks``
         self.carried: dict[str, Carried] = {}
 
     def compress(self, task: Task, recording: str, given: Carried | None) -> tuple[list[White], Carried | None]:
@@ -125,9 +125,10 @@ class Linearisation:
 
     def _blocks(self, task: Task, recording: str) -> tuple[list[Block], list[Block]]:
         """Blocks of a recording, and with one more draw of its noise where that is to be taken out."""
-        wanted = task.columns
-        blocks = self.machine.blocks(task.values, recording, wanted=wanted)
-        return blocks, self.machine.blocks(task.values, recording, True, wanted) if task.corrected else []
+        blocks = self.machine.blocks(task.values, recording, wanted=task.columns)
+        if not task.corrected:
+            return blocks, []
+        return blocks, self.machine.blocks(task.values, recording, disturbed=True, wanted=task.columns)
 
 
 def _size(blocks: list[Block]) -> int:

@@ -107,7 +107,7 @@ def held_to_account(
         change = log_odds_of_change(bench, fit, leading, effect)
         changes |= dict.fromkeys(told, change)
         other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
-        # of the little that is lost otherwise it need not be asked
+        # where hardly any probability goes to another size or cause, a remainder there need not be confirmed
         left = other < -CLEAR or account.instead(effect) >= CLEAR
         sets.add_without(effect, left, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told

@@ -46,8 +46,8 @@ class ReferenceActuator:
     name = "actuator"
     #: channel and equation, what shows of one in the other depends on the point
     moving = (("angle", "commutation"), ("angle", "sensor_speed"))
-    #: channels whose forms are taken off the recorded signals: what equations make of them depends on the point
-    bending = ("angle", "current_a", "current_b", "current_c", "voltage", "output")
+    #: channels whose forms are taken off the recorded signal: what equations make of it depends on the point
+    undone = frozenset(c for channels in CHANNELS.values() for c in channels)
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ import numpy as np
 from ...first_order import followed
 from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
-from .spectrum import refined_scale
+from .spectrum import refined
 
 AXIS = "what has built up"  # of its picture
 ALONG = "time"
@@ -67,12 +67,14 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The time constant."""
     source = int(shape["source"])
 
-    def likelihood(constants: Sequence[float]) -> list[float]:
-        return _values(left, driver, [(source, c) for c in constants]).tolist()
+    def likelihood(logs: Sequence[float]) -> list[float]:
+        return _values(left, driver, [(source, float(np.exp(x))) for x in logs]).tolist()
 
-    at, deviation, value = refined_scale(shape["time_constant"], CONSTANTS[1] / CONSTANTS[0], likelihood)
-    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, deviation, "s"))
-    return [Found(found, value, float(len(SOURCES) * len(CONSTANTS)))]
+    near, half = np.log(shape["time_constant"]), np.log(CONSTANTS[1] / CONSTANTS[0])
+    log, deviation = refined(float(near), float(half), likelihood)
+    at = float(np.exp(log))
+    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, at * deviation, "s"))
+    return [Found(found, likelihood([log])[0], float(len(SOURCES) * len(CONSTANTS)))]
 
 
 def told(values: np.ndarray) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Lines in a spectrum, how far a power stands above what is around it, and where a likelihood is largest."""
+"""Lines in a spectrum: how far a power stands above what is around it."""
 
 from collections.abc import Callable, Sequence
 
@@ -35,13 +35,3 @@ def refined(at: float, half: float, likelihood: Callable[[Sequence[float]], list
             best += float(np.clip(-slope / curvature, -half, half))
             deviation = float(1.0 / np.sqrt(-curvature))
     return best, deviation
-
-
-def refined_scale(
-    at: float, factor: float, likelihood: Callable[[Sequence[float]], list[float]]
-) -> tuple[float, float, float]:
-    """The same of a positive number within a ``factor`` of ``at``: where the log likelihood is largest, the standard
-    deviation there, and its value."""
-    x, deviation = refined(float(np.log(at)), float(np.log(factor)), lambda some: likelihood(np.exp(some).tolist()))
-    best = float(np.exp(x))
-    return best, best * deviation, float(likelihood([best])[0])
