@@ -11,10 +11,11 @@ from typing import Any
 PHASES = ("a", "b", "c")
 #: place in the machine, in the order of the simulations' terms -> unit of what a form adds there: to the driving
 #: torque, to a phase's back-EMF coefficient as a share of it, to its resistance, to the torque against the motion, to
-#: the electrical torque and to the rotor's inertia as a share of each
+#: the electrical torque and to the rotor's inertia as a share of each, to back-EMF coefficient and resistance of all
+#: phases
 MACHINE = {
     "torque": "N m", **{f"emf_{j}": "1" for j in PHASES}, **{f"resistance_{j}": "ohm" for j in PHASES}, "drag": "N m",
-    "torque_constant": "1", "inertia": "1",
+    "torque_constant": "1", "inertia": "1", "back_emf": "1", "resistance": "ohm",
 }  # fmt: skip
 #: the shape of the back-EMF of all phases, each along its own electrical angle -> unit of what a form adds to it
 SHAPE = {"emf": "1"}

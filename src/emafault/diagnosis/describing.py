@@ -63,10 +63,15 @@ class Describing(Settling):
         return len({f.id for f in self.described}.intersection(search.ranked()[0].units))
 
     def _keep_likely(self, search: Search) -> None:
-        """Let go of described forms that no likely set has."""
+        """Let go of described forms that no likely set has, but for those of the leading set in other channels.
+
+        What comes into one phase's channel, hum say, may be in another's too, where no scan would find it alone.
+        """
         ranked = search.ranked()
         likely = {u for m in ranked if m.log_posterior > ranked[0].log_posterior - NEAR for u in m.units}
-        self.describe([f for f in self.described if f.id in likely])
+        shapes = {(f.word, f.shape) for f in self.described if f.channel and f.id in ranked[0].units}
+        kept = [f for f in self.described if f.id in likely or (f.channel and (f.word, f.shape) in shapes)]
+        self.describe(kept)
 
     def _looked_through(self) -> list[str]:
         """As many recordings as a scan needs."""

@@ -108,7 +108,7 @@ class Bench(Describing):
         while self.scanned < MOST and self._count_scanned(search) == self.scanned:
             before = self.described
             self._keep_likely(search)
-            if not self._describe(f"led_{self.scanned}"):
+            if not self._describe(f"led_{self.scanned}") and len(self.described) == self._count_scanned(search):
                 self.describe(before)
                 break
             self.scanned += 1

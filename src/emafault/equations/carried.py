@@ -14,6 +14,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
 from .acquisition import GAIN_NAMES, RATE
+from .coordinates import COEFFICIENTS
 from .parameters import BEYOND
 from .sensor_speed import SENSOR
 from .telling import subject
@@ -52,7 +53,7 @@ def of_form(
     recordings : names, of those that have coefficients of their own
     """
     if form.channel:
-        place = form.channel.replace("k_", "emf_")
+        place = COEFFICIENTS.get(form.channel, form.channel)
     else:
         places = DRIVERS.get(form.equation, ())
         if form.driver >= len(places):
@@ -62,7 +63,8 @@ def of_form(
     module = FORMS[form.word]
 
     def told(recording: str) -> dict[str, float]:
-        found = module.told(factor * np.array([linear[n][0] for n in form.names(recording) if n in linear]))
+        values = factor * np.array([linear[n][0] for n in form.names(recording) if n in linear])
+        found = module.told(values, form.values)
         if "phase" in found:  # a wave is told by where it is highest
             found["phase"] = -found["phase"]
         return found

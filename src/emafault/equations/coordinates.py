@@ -14,6 +14,8 @@ from .signals import SPEED_SPAN, Signals, odd
 
 LEVEL = 4  # of the functions of a remainder: the current's
 TEMPERATURE = 14  # the temperature's
+#: coefficient that several equations have, of a phase or of all -> its place in the simulators
+COEFFICIENTS = {**{f"k_{j}": f"emf_{j}" for j in "abc"}, "k": "back_emf", "R": "resistance"}
 SLOW_FUNCTIONS = (0, 2, 5, 14)  # of the remainder: none, speed, time, temperature
 EACH = (0, 1, 2, 5, 16, 17)  # of the remainder, in each recording by itself: constant, direction, speed, time
 #: functions of a remainder along one coordinate: speed, current, time and temperature, angle

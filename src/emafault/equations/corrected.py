@@ -13,6 +13,7 @@ from ..io.recording import Recording, write_recording
 from ..io.sensors import calm_motion, without_spikes
 from ..switches import direction
 from .acquisition import GAIN_NAMES, RATE, drifting, full_range, rates, undone
+from .coordinates import COEFFICIENTS
 from .diagnose import Diagnosed
 from .point import Point
 from .position import SCALED
@@ -49,7 +50,7 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
     for form in found.bench.described:
         of_voltage = form.equation.startswith("electrical_") and form.driver == 0 and form.word in OF_THE_CHANNEL
         channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
-        if form.id in told and channel and not channel.startswith("k_"):
+        if form.id in told and channel and channel not in COEFFICIENTS:
             own = np.array([values.get(n, 0.0) for n in form.names(name)])
             x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name, form.channel), form.values)
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"

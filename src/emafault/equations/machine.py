@@ -11,7 +11,7 @@ from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
 from ..effects.scaling import scaled
 from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque, waveform
-from .coordinates import ALONG, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
+from .coordinates import ALONG, COEFFICIENTS, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
 from .parameters import beyond_tolerance, controller, internal, measuring_chain, nuisances, unit_of
 from .point import Point, State, effect_name
@@ -33,9 +33,10 @@ OF_STATE = {
 #: equation -> its channel, which may be slower than the recording
 OF_CHANNEL = {"sensor_speed": "speed", "position": "output", "bus": "bus"}
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
+RESISTANCE = 1  # driver of the electrical equations, the phase's current
 BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and of the torque's, that of the motor
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
-K_SCALE = 0.02  # relative change of a back-EMF coefficient, for the scale of its forms
+COEFFICIENT_SCALE = 0.02  # relative change of a coefficient, for the scale of its forms
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
 LATE_ANGLE = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of an angle that lags, with their sides
 
@@ -191,15 +192,17 @@ class ReferenceActuator:
 
     def coefficients(self, equation: str, driver: int) -> tuple[str, ...]:
         """Coefficients of other equations as well that a driver of an equation has."""
+        if driver == RESISTANCE and equation in electrical.NAMES:
+            return ("R",)
         if driver != BACK_EMF or equation not in (*electrical.NAMES, "torque"):
             return ()
-        return tuple(f"k_{j}" for j in ("abc" if equation == "torque" else equation[-1]))
+        return (*(f"k_{j}" for j in ("abc" if equation == "torque" else equation[-1])), "k")
 
     def place(self, place: str) -> tuple[str, float]:
         """Equation that a form in a channel or a coefficient is told in, and the scale of its size."""
-        quantity = place.split("_")[0]
-        if quantity == "k":
-            return f"electrical_{place[-1]}", K_SCALE
+        quantity, _, phase = place.partition("_")
+        if place in COEFFICIENTS:
+            return f"electrical_{phase}" if phase else "electrical", COEFFICIENT_SCALE * self._size(quantity)
         noise = next(iter(self.recordings.values())).noise
         name = {"output": "position"}.get(quantity, quantity)
         return "position" if quantity == "output" else f"sensor_{quantity}", STANDS_OUT * float(getattr(noise, name))
@@ -209,8 +212,10 @@ class ReferenceActuator:
         coefficient, take out of the residuals, each."""
         rec = self.recordings[name]
         off = {n: p.off for n, p in self.parameters.items()}
-        if place.startswith("k_"):
-            return self._back_emf(State(rec, Point(off, name, ())), "abc".index(place[-1]), x)
+        if place in COEFFICIENTS:
+            quantity, _, phase = place.partition("_")
+            of = self._back_emf if quantity == "k" else self._resistance
+            return of(State(rec, Point(off, name, ())), phase or "abc", x)
         self.prepare(name, off)
         before = self._recording(off, rec, ())
         step = self.place(place)[1] / STANDS_OUT
@@ -228,16 +233,26 @@ class ReferenceActuator:
         interval an edge lies. ``less`` as in ``blocks``."""
         return _seen(State(_less(self.recordings[name], less), Point(values, name, ())), equation, x)
 
-    def _back_emf(self, state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
-        """The same of a relative change of phase j's back-EMF coefficient: in its voltage and in the torque."""
-        rec, k = state.rec, float(value_of(state.k[j]))
-        voltage = -x * k * np.asarray(state.regressor[j].value)
-        if rec.current_end is None:
-            of = electrical.averaging(state, j)
-            voltage = np.array([of(v) for v in voltage])
-        drive = k * np.asarray(state.conducting[j].value) * np.asarray(state.current[j].value)
-        force = np.array([torque.two_intervals(-row * drive) for row in x])
-        return {electrical.NAMES[j]: voltage, "torque": force}
+    def _size(self, quantity: str) -> float:
+        """Of a coefficient: what its change is told in."""
+        return 1.0 if quantity == "k" else self.actuator.resistance
+
+    def _back_emf(self, state: State, phases: str, x: np.ndarray) -> dict[str, np.ndarray]:
+        """The same of a relative change of some phases' back-EMF coefficient: in their voltages and in the torque."""
+        out: dict[str, np.ndarray] = {"torque": np.zeros((len(x), state.rec.size))}
+        for j in map("abc".index, phases):
+            k = float(value_of(state.k[j]))
+            out |= _in_voltage(state, j, -x * k * np.asarray(state.regressor[j].value))
+            drive = k * np.asarray(state.conducting[j].value) * np.asarray(state.current[j].value)
+            out["torque"] = out["torque"] + np.array([torque.two_intervals(-row * drive) for row in x])
+        return out
+
+    def _resistance(self, state: State, phases: str, x: np.ndarray) -> dict[str, np.ndarray]:
+        """The same of a change (ohm) of some phases' resistance: in their voltages."""
+        out: dict[str, np.ndarray] = {}
+        for j in map("abc".index, phases):
+            out |= _in_voltage(state, j, -x * np.asarray(state.current[j].value))
+        return out
 
     def sampled(self, name: str, place: str) -> dict[str, Any]:
         """What the samples of a recording's channel lie along: those of an angle are taken at an interval's end, where
@@ -314,6 +329,14 @@ class ReferenceActuator:
                 self._functions.clear()
             self._functions[rec.name] = functions_of(rec.rows_from)
         return self._functions[rec.name]
+
+
+def _in_voltage(state: State, j: int, x: np.ndarray) -> dict[str, np.ndarray]:
+    """What signals x (column, sample) are in the rows of phase j's equation, by that one's name."""
+    if state.rec.current_end is None:
+        of = electrical.averaging(state, j)
+        x = np.array([of(v) for v in x])
+    return {electrical.NAMES[j]: x}
 
 
 def _seen(state: State, equation: str, x: np.ndarray) -> np.ndarray:

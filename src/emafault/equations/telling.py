@@ -9,7 +9,7 @@ import numpy as np
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
-from .coordinates import SWEPT, typical_torque
+from .coordinates import COEFFICIENTS, SWEPT, typical_torque
 
 EQUATION = {"commutation": "control"}  # of a block -> of the verdict
 Z = 1.645  # standard deviations of a 90 % interval
@@ -22,8 +22,11 @@ WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start
 
 def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, float]:
     """What has the form, its unit, and the factor from a coefficient to that unit."""
-    if form.channel.startswith("k_"):
-        return f"the back-EMF coefficient of phase {form.channel[-1]}, as a share of it,", "1", 1.0
+    if form.channel == "R":
+        return "the resistance of all phases", "ohm", 1.0
+    if form.channel in COEFFICIENTS:
+        of = f"phase {form.channel[-1]}" if form.channel != "k" else "all phases"
+        return f"the back-EMF coefficient of {of}, as a share of it,", "1", 1.0
     if form.channel:
         quantity, _, phase = form.channel.partition("_")
         words = {
@@ -82,7 +85,7 @@ def told(form: Described, linear: Mapping[str, tuple[float, float]], actuator: A
     values = factor * np.array([v for v, _ in linear.values()])
     spread = abs(factor) * float(np.sqrt(np.mean([sd**2 for _, sd in linear.values()])))
     warms_up = _warms_up(form)
-    for name, value in module.told(values).items():
+    for name, value in module.told(values, form.values).items():
         name = "offset" if warms_up else name
         angle = name == "phase"
         width = Z * (spread / max(float(np.hypot(*values[:2])), 1e-12) if angle else spread)
@@ -134,7 +137,7 @@ def _along(form: Described) -> str:
 def _of_a_clock(form: Described) -> bool:
     """Whether it adds something that goes with time alone."""
     source = memory.SOURCES[int(form.values["source"])] if form.word == "memory" else "start"
-    adds = not form.channel.startswith("k_") if form.channel else form.driver == 0
+    adds = form.channel not in COEFFICIENTS if form.channel else form.driver == 0
     return adds and _along(form) == "time" and source == "start"
 
 

@@ -12,7 +12,7 @@ coarse(left, driver) : a shape by name near which most stands out of what an equ
     Bayes factor; None where the recordings cannot show the form
 fine(left, driver, shape) : shapes near that one with their standard deviations
 position(coordinates, shape, coefficients) : (row,) what its picture goes along, and ``AXIS``, that in words
-told(coefficients) : what a reader wants of the coefficients: name -> value
+told(coefficients, shape) : what a reader wants of the coefficients: name -> value
 """
 
 from types import ModuleType

@@ -71,7 +71,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(found, float(values.max()), float(CELLS * len(WIDTHS)))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """The depth itself."""
     return {"depth": float(values[0])}
 

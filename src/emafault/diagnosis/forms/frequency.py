@@ -65,7 +65,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found((("frequency", f, deviation, "Hz"),), value, max(1.0, left.longest * HIGHEST / _step(left)))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Amplitude: root mean square over the recordings of what each has."""
     pairs = np.asarray(values).reshape(-1, 2)
     return {"amplitude": float(np.sqrt(np.mean(np.sum(pairs**2, axis=1))))}

@@ -1,5 +1,5 @@
-"""A function of one coordinate: a cubic spline through six knots, constant beyond them; its values at the knots add up
-to nothing, for a constant is a coefficient that every machine has."""
+"""A function of one coordinate: a cubic spline through six knots, constant beyond them. Its values at the knots add up
+to nothing, for a constant is a coefficient that every machine has; what goes with the current is nothing at none."""
 
 from collections.abc import Mapping
 
@@ -18,22 +18,32 @@ CHANNELS: tuple[str, ...] = ()
 KNOTS = 6
 VALUES = tuple(f"at_{k + 1}" for k in range(KNOTS))
 COEFFICIENTS = tuple(f"c_{k + 1}" for k in range(KNOTS - 1))
-#: (knot, coefficient) values that add up to nothing
-SHAPES = null_space(np.ones((1, KNOTS)))
 #: coordinate -> unit
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
+FROM_ZERO = "current"  # the coordinate at whose zero the machine is as it is without the form
+#: (knot, coefficient) values that add up to nothing, and that begin with it
+BALANCED, ABOVE = null_space(np.ones((1, KNOTS))), np.eye(KNOTS)[:, 1:]
 CELLS = 40  # of the range
 FEWEST = 3  # temperatures that show a function of it
 
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
-    """(coefficient, row) splines whose values at the knots are ``SHAPES``."""
-    along = tuple(COORDINATES)[int(shape["coordinate"])]
-    return _splines(coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
+    """(coefficient, row) splines of values at the knots."""
+    along = _along(shape)
+    return _splines(along, coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
 
 
-def _splines(x, knots: np.ndarray) -> np.ndarray:
-    of = CubicSpline(knots, SHAPES, bc_type="not-a-knot")
+def _along(shape: Shape) -> str:
+    return tuple(COORDINATES)[int(shape["coordinate"])]
+
+
+def _values(along: str) -> np.ndarray:
+    """(knot, coefficient) values at the knots of a function of a coordinate."""
+    return ABOVE if along == FROM_ZERO else BALANCED
+
+
+def _splines(along: str, x, knots: np.ndarray) -> np.ndarray:
+    of = CubicSpline(knots, _values(along), bc_type="not-a-knot")
     return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
 
 
@@ -47,6 +57,8 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
         low, high = float(min(v.min() for v in x)), float(max(v.max() for v in x))
         if (along == "temperature" and len({float(v[0]) for v in x}) < FEWEST) or high - low < 1e-9:
             continue
+        if along == FROM_ZERO:
+            low = 0.0
         shape = {"coordinate": float(number), "from": low, "to": high}
         step = (high - low) / CELLS
 
@@ -54,7 +66,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
             return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
 
         cells = left.cells(cell, CELLS, driver)
-        splines = _splines(low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
+        splines = _splines(along, low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
         value = gain(*of_cells(splines, cells))
         if best is None or value > best[1]:
             best = shape, value
@@ -68,16 +80,16 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
         return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, shape)])
 
     value = gain(*beside_first(*left.products(of, driver)))
-    along = tuple(COORDINATES)[int(shape["coordinate"])]
+    along = _along(shape)
     found = tuple((n, v, 0.0, "" if n == "coordinate" else COORDINATES[along]) for n, v in shape.items())
     return [Found(found, value, float(len(COORDINATES)))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Values at the knots."""
-    return dict(zip(VALUES, (SHAPES @ values).tolist(), strict=True))
+    return dict(zip(VALUES, (_values(_along(shape)) @ values).tolist(), strict=True))
 
 
 def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
     """(row,) the coordinate that the shape names."""
-    return np.asarray(coordinates[tuple(COORDINATES)[int(shape["coordinate"])]])
+    return np.asarray(coordinates[_along(shape)])

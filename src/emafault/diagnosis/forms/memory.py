@@ -77,7 +77,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(found, likelihood([log])[0], float(len(SOURCES) * len(CONSTANTS)))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """The gain itself."""
     return {"gain": float(values[0])}
 

@@ -81,7 +81,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found(s, value, among) for (s, among), value in zip(tried, values, strict=True)]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Amplitude and phase."""
     return {"amplitude": float(np.hypot(*values)), "phase": float(np.arctan2(values[1], values[0]))}
 

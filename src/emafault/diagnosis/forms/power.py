@@ -56,7 +56,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     ]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Its size at the reference."""
     return {"at_100_rad_s": float(values[0])}
 

@@ -70,7 +70,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found((("time", at, deviation, "s"),), value, float(CELLS * FINER))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """The jump itself."""
     return {"jump": float(values[0])}
 

@@ -68,7 +68,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     return [Found((("length", length, spread + 0.05 * length, "rad"),), float(values[k]), float(len(LENGTHS)))]
 
 
-def told(values: np.ndarray) -> dict[str, float]:
+def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Its size once it has built up."""
     return {"amplitude": float(values[0])}
 
