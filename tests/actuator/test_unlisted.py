@@ -132,6 +132,8 @@ ELSEWHERE = {
     "drag": ("power", {"at_100_rad_s": 0.02, "exponent": 2.0}),
     "torque_constant": ("function", function_of("current", 0.0, 3.0, [0.1, 0.1, 0.0, -0.1, -0.1, -0.2])),
     "inertia": ("step_change", {"jump": 0.5, "time": 0.0}),
+    "back_emf": ("function", function_of("current", 0.0, 3.0, [0.0, -0.1, -0.1, -0.2, -0.2, -0.3])),
+    "resistance": ("function", function_of("rotor_speed", -150.0, 150.0, [0.3, 0.1, 0.0, 0.0, 0.1, 0.3])),
 }
 
 

@@ -1,6 +1,7 @@
 """Which listed effect a described form is much like."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -103,6 +104,19 @@ def test_what_a_listed_effect_could_be_is_no_form(sizes, found):
     bench._describe("first")
     assert {d.id for d in bench.described if d.word == "frequency"} == found
     assert all(d.values["frequency"] == pytest.approx(21.3, abs=0.1) for d in bench.described if d.id in found)
+
+
+@pytest.mark.parametrize(("leads", "kept"), [("~f_a", "ab"), ("~f_t", "t")])
+def test_what_is_in_one_channel_may_be_in_another(leads, kept):
+    """A channel's form keeps those of its shape in other channels beside it, which no scan would find alone."""
+    bench = Bench(Wave((0.0, 0.0)), Wave.recordings)
+    shape, other = ((("frequency", f, 0.01, "Hz"),) for f in (50.0, 21.3))
+    form = Described("", "frequency", "sensor_current", 0, shape, 1.0, 1.0, "sensor_current")
+    forms = [replace(form, id=f"~f_{j}", channel=f"current_{j}") for j in "ab"]
+    forms += [replace(forms[1], id="~f_c", shape=other), replace(form, id="~f_t", equation="torque", seen="")]
+    bench.describe([*forms, replace(forms[3], id="~f_u")])
+    bench._keep_likely(SimpleNamespace(ranked=lambda: [Model((Choice(leads, 0, 1.0),), 0.0)]))
+    assert [f.id for f in bench.described] == [f"~f_{j}" for j in kept]
 
 
 @pytest.mark.parametrize("left", [True, False])

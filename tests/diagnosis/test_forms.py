@@ -259,3 +259,15 @@ def test_wandering_is_asked_of_all_recordings_together():
     assert log_odds(bench(0.05, 0.05, 0.05), ["r2"])["torque"] > 10.0
     assert log_odds(bench(0.05, 0.05, 0.0), ["r2"])["torque"] < 0.0
     assert log_odds(bench(0.0, 0.0, 0.05), ["r2"])["torque"] < 0.0
+
+
+def test_what_goes_with_the_current_is_nothing_at_none():
+    """There the machine is as it is: a constant of what goes with anything else is a coefficient of its own."""
+    shape = {"coordinate": 1.0, "from": 0.0, "to": 6.0}
+    current = np.linspace(0.0, 6.0, 61)
+    of_current = np.arange(1.0, 6.0) @ FORMS["function"].columns({"current": current}, shape)
+    assert of_current[0] == pytest.approx(0.0, abs=1e-12)
+    told = FORMS["function"].told(np.arange(1.0, 6.0), shape)
+    np.testing.assert_allclose(of_current[::12], list(told.values()), atol=1e-9)
+    of_speed = FORMS["function"].told(np.arange(1.0, 6.0), {**shape, "coordinate": 0.0})
+    assert sum(of_speed.values()) == pytest.approx(0.0, abs=1e-9)

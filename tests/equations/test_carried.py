@@ -1,5 +1,7 @@
 """What is described becomes an entry that simulators have: of the same values, where the form's driver acts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,23 @@ def test_a_place_is_what_its_driver_multiplies(equation, driver):
     entry = of_form(form, {form.names("a.nc")[0]: (size, 0.0)}, ["a.nc"], ACTUATOR)
     assert entry["place"] == DRIVERS[equation][driver]
     assert found(form, entry) == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "equation", "driver", "size"),
+    [
+        ("k", "electrical_b", 2, 0.05),
+        ("k", "torque", 2, 0.05),
+        ("k_b", "torque", 2, 0.1),
+        ("R", "electrical_c", 1, 0.1),
+    ],
+)
+def test_a_coefficient_is_in_every_equation_that_has_it(coefficient, equation, driver, size):
+    """Whichever of them the scan has seen it in: as much in each of the others as the simulator makes it."""
+    form = described("step_change", "electrical", driver, channel=coefficient)
+    entry = of_form(form, {form.names("a.nc")[0]: (size, 0.0)}, ["a.nc"], ACTUATOR)
+    check_unlisted([entry])
+    assert found(replace(form, seen=equation), entry) == pytest.approx(size, rel=0.1)
 
 
 def test_what_is_in_a_channel_or_a_coefficient_lies_there():
@@ -294,12 +313,13 @@ def test_a_form_is_as_large_where_an_interval_sweeps_much_of_it(sized, shape, si
     assert np.hypot(*found, *[0.0] * (2 - len(found))) == pytest.approx(size, rel=0.05)
 
 
-def test_what_the_motor_s_torque_lacks_about_an_angle_may_be_the_magnet_of_any_phase():
+def test_what_the_motor_s_torque_lacks_about_an_angle_may_be_the_magnet_of_any_phase_or_all():
     machine = machine_of({"a.nc": recorded([])})
     bump = Described("~b", "bump", "torque", 2, (("centre", 2.0, 0.1, "rad"), ("width", 0.4, 0.1, "rad")), 1.0, 1.0)
     _, *elsewhere = proposed(machine, [(9.0, bump)])
     assert [(f.channel, f.equation, f.seen) for f in elsewhere] == [
-        (f"k_{j}", f"electrical_{j}", "torque") for j in "abc"
+        *((f"k_{j}", f"electrical_{j}", "torque") for j in "abc"),
+        ("k", "electrical", "torque"),
     ]
     friction = Described("~f", "bump", "torque", 1, bump.shape, 1.0, 1.0)
     assert proposed(machine, [(9.0, friction)]) == [friction]
