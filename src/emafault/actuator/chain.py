@@ -1,8 +1,8 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
 Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
-filter, and drift; the sensors' noise; then spikes, held samples, a channel slower than the recording, clipping and the
-converter's steps.
+filter, instants of sampling that scatter, and drift; the sensors' noise; then spikes, held samples, a channel slower
+than the recording, clipping and the converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,17 @@ RECORDED = {
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
-ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "drift", *AFTER_NOISE)  # of the forms, shapes first
+ORDER = (
+    "",
+    "gain",
+    "sensor_curve",
+    "drop",
+    "crosstalk",
+    *LATE,
+    "clock",
+    "drift",
+    *AFTER_NOISE,
+)  # of the forms, shapes first
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 
@@ -68,6 +78,10 @@ class Chain:
                 current = entry["place"].replace("voltage", "current")
                 (x,), (i, *_) = _channels(signals, entry["place"]), _channels(true, current)
                 x += entry["drop"] * direction(i, entry["turn"])
+            elif entry["form"] == "clock":
+                rng = np.random.default_rng([self.seed, 7, self.number])
+                for x in _channels(signals, entry["place"]):
+                    x += entry["scatter"] * rng.standard_normal(len(x)) * np.gradient(x, self.interval)
             elif entry["form"] not in AFTER_NOISE:
                 for x in _channels(signals, entry["place"]):
                     self._change(x, entry)

@@ -52,7 +52,8 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
-    "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "from": (*ANY, ""), "to": (*ANY, ""),
+    "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "scatter": (1e-9, 0.1, "s"),
+    "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
 SHARE = 0.9  # largest, of what a form adds as a share
 #: form -> its parameters; SI. What they mean: ``unlisted.SHAPES`` and ``chain``
@@ -67,6 +68,7 @@ OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
     "sensor_curve": ("bend",), "gain": ("gain", "growth"), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),
+    "clock": ("scatter",),
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
 OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
@@ -98,6 +100,7 @@ def forms_at(place: str) -> list[str]:
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased or quantity == "output",
         "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output"),
+        "clock": quantity in ("angle", "output"),
     }  # fmt: skip
     return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]
 

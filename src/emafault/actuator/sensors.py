@@ -11,7 +11,11 @@ from .grammar import MACHINE
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Standard deviation of each recorded value, whatever the interval (SI; ambient temperature in K)."""
+    """Standard deviation of each recorded value, whatever the interval (SI; ambient temperature in K).
+
+    ``angle_timing`` is that of the instants (s) at which the angle is sampled, by which it is off in proportion to the
+    speed: none in simulations, where it is the form ``clock`` of the measuring chain.
+    """
 
     voltage: float
     current: float
@@ -21,6 +25,7 @@ class SensorNoise:
     position: float
     bus_voltage: float
     ambient: float
+    angle_timing: float = 0.0
 
 
 #: recorded variable -> its field of ``SensorNoise``

@@ -140,7 +140,7 @@ def _spread(state: State, j: int, low: np.ndarray, high: np.ndarray) -> tuple[np
 
 def _new_spread(rec, rows: np.ndarray, j: int, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     poles = rec.actuator.pole_pairs
-    ends = poles * rec.noise.angle
+    ends = poles * rec.angle_noise[rows]
     ramp = passing_time(rec.actuator, np.abs(rec.current[rows, STAYS[j]])) / np.sqrt(12.0)
     time = np.hypot(ripple_time(rec.actuator), ramp)
     return np.hypot(poles * np.abs(rec.speed[rows]) * time, ends), np.maximum(width, ends)
@@ -170,7 +170,7 @@ def noise_bands(state: State) -> list[np.ndarray]:
         reach, width = _spread(state, j, low, high)
         inside = ndtr((high - edge.value) / reach) - ndtr((low - edge.value) / reach)
         share = np.clip((high - edge.value) / width, 0.0, 1.0)
-        ends = a.pole_pairs * rec.noise.angle / width
+        ends = a.pole_pairs * rec.angle_noise[rows] / width
         off = (ripple_time(a) / rec.interval) ** 2 + (share**2 + (1.0 - share) ** 2) * ends**2
         passing = inside * np.minimum(off, WIDEST) * stays**2
         # of two currents that add up to nothing with the third, the second times the share

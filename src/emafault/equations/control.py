@@ -103,7 +103,7 @@ def _least_risk(rec) -> int:
     impulse = np.zeros(4 * (longest + calm) + 1)
     impulse[len(impulse) // 2] = 1.0
     speed = rec.noise.speed * np.sqrt(rec.spacing("speed"))
-    noise = [speed * impulse, rec.noise.angle / h * np.diff(impulse, prepend=0.0)]
+    noise = [speed * impulse, _size(rec.angle_noise) / h * np.diff(impulse, prepend=0.0)]
     noise = [uniform_filter1d(x, calm) for x in noise]
     risk = {}
     for span in sorted({odd(longest / 2**k) for k in range(longest.bit_length())}):
@@ -233,6 +233,11 @@ def _centred(x: np.ndarray, h: float, lead: float) -> np.ndarray:
     return np.interp(n, np.arange(-1, len(x)), np.concatenate([[0.0], x]))
 
 
+def _size(x: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
 def _means(x: np.ndarray, width: int) -> np.ndarray:
     count = len(x) // width
     return x[: count * width].reshape(count, width).mean(axis=1)
@@ -302,7 +307,7 @@ def _noise_bands(state: State) -> list[np.ndarray]:
     for source, sigma in (
         (position * slow, s.position * np.sqrt(rec.spacing("output"))),
         (uniform_filter1d(uniform_filter1d(impulse, calm), span), s.speed * np.sqrt(rec.spacing("speed"))),
-        (a.position_gain * (impulse - slow) + rate - uniform_filter1d(rate, span), s.angle),
+        (a.position_gain * (impulse - slow) + rate - uniform_filter1d(rate, span), _size(rec.angle_noise)),
     ):
         demand = a.speed_gain * source + a.speed_integral_gain * h * np.cumsum(source)
         blocked = uniform_filter1d(demand, width, mode="nearest")

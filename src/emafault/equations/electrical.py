@@ -208,7 +208,7 @@ def noise_bands(state: State, j: int) -> list[np.ndarray]:
         turned = direction(rec.current[:, j], float(p("drop.turn").value))
         white = white + (TURNING * drop * (1.0 - turned**2)) ** 2
     f = np.asarray(value_of(state.conducting[j]))
-    angle = (a.back_emf * s.angle / rec.interval) ** 2 * f * f
+    angle = (a.back_emf * rec.angle_noise / rec.interval) ** 2 * f * f
     if rec.current_end is None:
         runs = _runs(state, j)
         of, lengths = runs.mean, runs.lengths

@@ -61,4 +61,4 @@ def _rounding(state: State, shaft: Dual) -> Dual:
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonal of the noise's covariance (rad2)."""
     rec = state.rec
-    return [np.full(rec.size, rec.noise.position**2 + (rec.noise.angle / rec.actuator.gear_ratio) ** 2)]
+    return [rec.noise.position**2 + (rec.angle_noise / rec.actuator.gear_ratio) ** 2]

@@ -12,7 +12,7 @@ from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
 from ..io.updates import repeated, updates
-from .signals import MAY_BE_SLOWER
+from .signals import MAY_BE_SLOWER, angle_timing
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {
@@ -37,7 +37,8 @@ class Channel:
     ``noise``: standard deviation, robust, from third differences, in which the motion hardly shows, but for the
     inverter's ripple in the voltages; ``step``: of its
     converter, 0 where there is none to be seen; ``held``, ``spikes``, ``clipped``: shares of its samples; ``level``: at
-    which it is cut off; ``every``: samples from one that is new to the next, of a channel slower than the recording.
+    which it is cut off; ``every``: samples from one that is new to the next, of a channel slower than the recording;
+    ``scatter``: standard deviation of the instants at which it is sampled (s).
     """
 
     noise: float
@@ -47,6 +48,7 @@ class Channel:
     clipped: float = 0.0
     level: float = 0.0
     every: float = 0.0
+    scatter: float = 0.0
 
 
 def seen(recording: Recording, lacking: Collection[str] = ()) -> dict[str, Channel]:
@@ -68,6 +70,8 @@ def seen(recording: Recording, lacking: Collection[str] = ()) -> dict[str, Chann
             out[channel] = replace(out[channel], spikes=found / len(values) if found >= FEWEST_SPIKES else 0.0)
         if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := resting_noise([recording])):
             out[channel] = replace(out[channel], noise=noise)
+        if channel == "rotor_angle":
+            out[channel] = replace(out[channel], scatter=angle_timing([recording])[0])
         if channel in BY_STEPS and BY_STEPS[channel] not in lacking:
             out[channel] = replace(out[channel], step=0.0, held=0.0)
     return out
@@ -90,7 +94,7 @@ def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
 
 
 def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
-    """Clipping, steps, held samples and spikes as entries of ``discovered``.
+    """Clipping, steps, held samples, spikes and scattered instants as entries of ``discovered``.
 
     Parameters
     ----------
@@ -110,6 +114,8 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
              "the {0} channel is slower than the recording: one sample in {1:.3g} is new"),
             ("spikes", {n: c.spikes for n, c in mine.items()}, "share", "1",
              "the {0} channel has spikes in {3:.2g} % of its samples"),
+            ("clock", {n: c.scatter for n, c in mine.items()}, "scatter", "s",
+             "the {0} channel is sampled at instants that scatter by {1:.2g} s"),
         ):  # fmt: skip
             found = {n: x for n, x in found.items() if x}
             if found:
@@ -171,7 +177,7 @@ def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[
         for k, share, text in (
             ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
             ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
-            ("every", False, "one sample in {0:.2g} is new"),
+            ("every", False, "one sample in {0:.2g} is new"), ("scatter", False, "instants scatter by {0:.2g} s"),
         )
         if k in found
     ]  # fmt: skip

@@ -52,12 +52,19 @@ def noise_bands(state: State) -> list[np.ndarray]:
         of_angle = np.convolve(of_angle, m.response(state.p.of(effect_name(m)), rec))
     for channel in ("speed", SENSOR):
         of_angle = np.convolve(of_angle, response_of(state.p, channel))
-    angle = (rec.noise.angle / rec.interval) ** 2 * np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
+    shares = np.correlate(of_angle, of_angle, "full")[len(of_angle) - 1 :]
+    angle = (rec.angle_noise / rec.interval) ** 2
+    longer = np.pad(angle, (len(of_angle) - 1, 0), mode="edge")
     rounded = (0.5 * rec.speed_step) ** 2  # next to a change
     white = rec.noise.speed**2 + rounded
-    together = np.flatnonzero(np.abs(angle) > LITTLE * (white + angle[0]))
+    largest = float(angle.max())
+    together = np.flatnonzero(largest * np.abs(shares) > LITTLE * (white + largest * shares[0]))
     last = int(together[-1]) if len(together) else 0
-    return [np.full(rec.size, white + angle[0]), *(np.full(rec.size - m, angle[m]) for m in range(1, last + 1))]
+    bands = [
+        np.convolve(longer, of_angle[: len(of_angle) - m] * of_angle[m:], "full")[len(of_angle) - 1 :][: rec.size - m]
+        for m in range(last + 1)
+    ]
+    return [white + bands[0], *bands[1:]]
 
 
 def usable(state: State) -> np.ndarray:

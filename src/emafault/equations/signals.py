@@ -25,6 +25,7 @@ STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands 
 AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding changes evenly over, from which it is none of the noise's
 STRETCHES = 30  # in a recording
+AROUND = 9  # samples, that what is left of a speed is taken against the mean of
 QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
 #: channels that may be slower than the recording -> variable
 MAY_BE_SLOWER = {"speed": "rotor_speed", "output": "output_position", "bus": "bus_voltage"}
@@ -107,6 +108,8 @@ class Signals:
         self.speed = uniform_filter1d(self.rate, span, mode="nearest")
         self.calm = uniform_filter1d(theta, span, mode="nearest")
         self.calm_before = np.concatenate([self.calm[:1], self.calm[:-1]])
+        # standard deviation of the angle's noise (rad), (sample,)
+        self.angle_noise = np.hypot(self.noise.angle, self.noise.angle_timing * self.speed)
         self.direction = np.sign(self.speed)
         moving = np.abs(self.speed) > SLOW
         # dry friction is known where the rotor moves throughout, one way: a quick reversal has no slow sample
@@ -191,7 +194,7 @@ class Signals:
         """A copy with a draw of the sensors' noise added once more; what is masked and along what rows lie stays."""
         rng = np.random.default_rng(seed)
 
-        def more(x: np.ndarray, sigma: float) -> np.ndarray:
+        def more(x: np.ndarray, sigma: float | np.ndarray) -> np.ndarray:
             return x + sigma * rng.standard_normal(x.shape)
 
         def of_currents(x: np.ndarray, sigma: float, shares: np.ndarray) -> np.ndarray:
@@ -209,7 +212,7 @@ class Signals:
             voltage=more(self.voltage, s.voltage), current=of_currents(self.current, s.current, self.shares[0]),
             current_end=None if self.current_end is None
             else of_currents(self.current_end, s.current_end, self.shares[1]),
-            speed_recorded=of_channel("speed", self.speed_recorded, s.speed), angle=more(self.angle, s.angle),
+            speed_recorded=of_channel("speed", self.speed_recorded, s.speed), angle=more(self.angle, self.angle_noise),
             output=of_channel("output", self.output, s.position),
             bus=None if self.bus is None else of_channel("bus", self.bus, s.bus_voltage),
         )  # fmt: skip
@@ -296,7 +299,9 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
 
     finest = min(r.interval for r in recordings)
     fine = [r for r in recordings if r.interval < 1.5 * finest]
+    timing, beside = angle_timing(fine)
     angle = min(robust([np.diff(r.rotor_angle, n) for r in fine]) / np.sqrt(comb(2 * n, n)) for n in (3, 4))
+    angle = beside if timing > 0.0 else angle
     step = max(lattice_step(x) for r in recordings for x in r.phase_current.T)
     news = [_new(r) for r in recordings]
     outputs = [_of_new(r, "output", new) for r, new in zip(recordings, news, strict=True)]
@@ -331,7 +336,38 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             if np.isfinite(v)
         }
         | _stated(recordings),
+        angle_timing=max(timing, nominal.angle_timing),
     )
+
+
+def angle_timing(recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Standard deviations of the instants at which the angle is sampled (s), 0 where it shows none, and of the angle's
+    noise beside it (rad).
+
+    An error of the angle is in its rate in one interval and, with the other sign, in the next, where no error of the
+    recorded speed is: by the product of both, less the speed, in proportion to the square of the speed. By weighted
+    least squares; there is none where Schwarz's criterion says so.
+    """
+    of, squares = [], []
+    for r in (calm_motion(r) for r in recordings):
+        rate = np.diff(r.rotor_angle) / r.interval
+        beyond = rate - r.rotor_speed[1:]
+        beyond = r.interval * (beyond - uniform_filter1d(beyond, AROUND, mode="nearest"))
+        of.append(-beyond[1:] * beyond[:-1])
+        squares.append(uniform_filter1d(rate, AROUND, mode="nearest")[1:] ** 2)
+    y, x = np.concatenate(of), np.concatenate(squares)
+    columns, size = np.column_stack([np.ones(len(x)), x]), np.ones(len(x))
+    if np.ptp(x) == 0.0 or not y.any():
+        return 0.0, 0.0
+    for _ in range(4):
+        white = columns / size[:, None]
+        inverse = np.linalg.inv(white.T @ white)
+        found = inverse @ (white.T @ (y / size))
+        size = np.maximum(columns @ np.maximum(found, 0.0), 1e-3 * float(np.mean(np.abs(y))))
+    spread = float(np.sqrt(np.mean(((y - columns @ found) / size) ** 2) * inverse[1, 1]))
+    if found[1] <= 0.0 or (found[1] / spread) ** 2 < np.log(len(y)):
+        return 0.0, 0.0
+    return float(np.sqrt(found[1])), float(np.sqrt(max(found[0], 0.0)))
 
 
 def _stated(recordings: Sequence[Recording]) -> dict[str, float]:

@@ -78,16 +78,16 @@ def usable(state: State) -> np.ndarray:
 def noise_bands(state: State) -> list[np.ndarray]:
     """Diagonals of the noise's covariance ((N m)2)."""
     rec, a, s = state.rec, state.rec.actuator, state.rec.noise
-    angle = (a.inertia * s.angle / rec.interval**2) ** 2
-    n = rec.size
+    angle = (a.inertia * rec.angle_noise / rec.interval**2) ** 2
+    before, later = np.append(angle[:1], angle[:-1]), np.append(angle[1:], angle[-1:])
     current = _of_pair(state) * (a.back_emf * s.current / state.inertia) ** 2
     after = np.append(current[1:], current[-1:])
     change = np.abs(np.diff(state.shared, append=state.shared[-1:]))
     change = np.maximum(change, np.concatenate([change[:1], change[:-1]]))
     return [
-        6.0 * angle + 0.25 * (current + after) + (UNRESOLVED / state.inertia * change) ** 2,
-        -4.0 * angle + 0.25 * after[:-1],
-        np.full(n - 2, angle),
+        before + 4.0 * angle + later + 0.25 * (current + after) + (UNRESOLVED / state.inertia * change) ** 2,
+        -2.0 * (angle[:-1] + angle[1:]) + 0.25 * after[:-1],
+        angle[1:-1],
     ]
 
 
