@@ -1,7 +1,7 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
 Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
-filter, instants of sampling that scatter, and drift; the sensors' noise; then spikes, held samples, a channel slower
+filter, clocks of their own, and drift; the sensors' noise; then spikes, held samples, a channel slower
 than the recording, clipping and the converter's steps.
 """
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..first_order import filtered, smoothed
+from ..resampled import before
 from ..switches import direction
 from .grammar import CONTROLLER, FACTORS, MACHINE, PHASES, SHAPE, SHAPES, of_recording
 from .motor import AXIS, trapezoid
@@ -21,6 +22,7 @@ Signals = dict[str, np.ndarray]
 RECORDED = {
     "voltage": ("phase_voltage",), "current": ("phase_current", "phase_current_end"), "speed": ("rotor_speed",),
     "angle": ("rotor_angle",), "output": ("output_position",), "bus": ("bus_voltage",),
+    "positions": ("rotor_angle", "output_position"), "motion": ("rotor_speed", "rotor_angle", "output_position"),
 }  # fmt: skip
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
@@ -81,7 +83,9 @@ class Chain:
             elif entry["form"] == "clock":
                 rng = np.random.default_rng([self.seed, 7, self.number])
                 for x in _channels(signals, entry["place"]):
-                    x += entry["scatter"] * rng.standard_normal(len(x)) * np.gradient(x, self.interval)
+                    late = entry.get("late", 0.0) + entry.get("rate", 0.0) * np.arange(1.0, len(x) + 1.0)
+                    scatter = entry.get("scatter", 0.0) / self.interval * rng.standard_normal(len(x))
+                    x[...] = before(x, late + scatter)
             elif entry["form"] not in AFTER_NOISE:
                 for x in _channels(signals, entry["place"]):
                     self._change(x, entry)

@@ -19,10 +19,11 @@ MACHINE = {
 }  # fmt: skip
 #: the shape of the back-EMF of all phases, each along its own electrical angle -> unit of what a form adds to it
 SHAPE = {"emf": "1"}
-#: channel of the measuring chain -> its unit; without a phase, that of all three
+#: channel of the measuring chain -> its unit; without a phase, that of all three; both positions, and the speed too
 CHANNELS = {
     "voltage": "V", **{f"voltage_{j}": "V" for j in PHASES}, "current": "A", **{f"current_{j}": "A" for j in PHASES},
     "speed": "rad/s", "angle": "rad", "output": "rad", "bus_voltage": "V",
+    "positions": "1", "motion": "1",
 }  # fmt: skip
 #: what multiplies a signal in the measuring chain -> its unit: a channel's relative gain, a voltage in proportion to
 #: speed times the shape of the back-EMF, an output position in proportion to the direction or the acceleration
@@ -53,6 +54,7 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "scatter": (1e-9, 0.1, "s"),
+    "late": (-100.0, 100.0, "recording intervals"), "rate": (-0.1, 0.1, "1"),
     "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
 SHARE = 0.9  # largest, of what a form adds as a share
@@ -68,7 +70,7 @@ OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
     "sensor_curve": ("bend",), "gain": ("gain", "growth"), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),
-    "clock": ("scatter",),
+    "clock": ("scatter", "late", "rate"),
 }  # fmt: skip
 #: a first-order filter, and the command's speed added to the demanded speed, times a gain
 OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
@@ -78,9 +80,10 @@ ORDERS = (3, 5, 7, 9, 11, 13)
 OF_SHAPE = {"harmonics": tuple(f"h{n}" for n in ORDERS)}
 FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER | OF_SHAPE
 #: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing, a
-#: gain that stays, a harmonic that is not there
+#: gain that stays, a harmonic that is not there, what a clock does not do
 OPTIONAL = {
     "frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",), "harmonics": OF_SHAPE["harmonics"],
+    "clock": OF_CHANNELS["clock"],
 }  # fmt: skip
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
 EACH = "recordings"
@@ -92,6 +95,8 @@ def forms_at(place: str) -> list[str]:
         return list(OF_CONTROLLER)
     if place in SHAPE:
         return list(OF_SHAPE)
+    if place in ("positions", "motion"):
+        return ["clock"]
     shapes = [form for form in SHAPES if form != "travel" or place == "torque"]
     if place not in CHANNELS:
         return shapes
@@ -100,7 +105,7 @@ def forms_at(place: str) -> list[str]:
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased or quantity == "output",
         "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output"),
-        "clock": quantity in ("angle", "output"),
+        "clock": quantity in ("angle", "output", "speed"),
     }  # fmt: skip
     return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]
 

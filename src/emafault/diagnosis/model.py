@@ -13,8 +13,8 @@ SETTINGS = ("control", "commutation")  # equations of the controller, whose form
 TOLERANCES = 4.0  # within which a unit's own values lie: its parameters' prior standard deviations
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
-    "lag", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "pulse", "function",
-    "power", "memory", "travel", "harmonics",
+    "lag", "clock", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "pulse",
+    "function", "power", "memory", "travel", "harmonics",
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..actuator.parameters import ActuatorParameters
 from ..first_order import LEAST, ahead, filtered, response, smoothed
@@ -18,6 +19,12 @@ from .point import Point, effect_name
 from .signals import Signals
 from .terms import with_hook
 
+#: logger -> channels that it may have of its own, with a clock that is not that of the rest
+CLOCKS = {
+    "angle": ("angle",), "output": ("output",), "speed": ("speed",), "positions": ("angle", "output"),
+    "motion": ("angle", "output", "speed"),
+}  # fmt: skip
+AROUND = 9  # samples, that a speed is averaged over where it is told how fast it changes
 OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage or current may lag by itself
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
@@ -66,7 +73,38 @@ def recorded_late(p: Point, channel: str, x: Dual, size: int, phase: str = "") -
     skew = p(f"skew.{channel}@{p.recording}")
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (delayed(np.asarray(x.value)) - advanced(np.asarray(x.value))))
+    late = behind(p, channel, size)
+    if late.slopes or np.any(late.value):
+        out = out + as_before(np.asarray(x.value), late, channel)
     return out
+
+
+def clock_names(of: str, recording: str) -> tuple[str, str]:
+    """Parameters of a logger of ``CLOCKS``: by how many intervals it is late at a recording's start, and by which share
+    its clock is slow."""
+    return f"clock.{of}@{recording}", f"clock_rate.{of}"
+
+
+def behind(p: Point, channel: str, size: int) -> Dual:
+    """(sample,) intervals by which a channel's logger is late."""
+    out = Dual(0.0)
+    for of in (of for of, channels in CLOCKS.items() if channel in channels):
+        start, rate = (p(n) for n in clock_names(of, p.recording))
+        if start.slopes or start.value:
+            out = out + start * np.ones(size)
+        if rate.slopes or rate.value:
+            out = out + rate * np.arange(1.0, size + 1.0)
+    return out
+
+
+def as_before(x: np.ndarray, late: Dual, channel: str) -> Dual:
+    """What a signal changes by where it is as it was some intervals before, to the second order; a speed, which is
+    noisy, to the first."""
+    if channel == "speed":
+        calm = uniform_filter1d(x, AROUND, mode="nearest")
+        return late * (0.5 * (delayed(calm) - advanced(calm)))
+    back, ahead_of = delayed(x), advanced(x)
+    return late * (0.5 * (back - ahead_of)) + late * late * (0.5 * (back + ahead_of))
 
 
 def response_of(p: Point, channel: str) -> np.ndarray:

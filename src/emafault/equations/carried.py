@@ -103,6 +103,11 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
         if way in SMOOTH:
             return _rounded({"place": channel, "form": SMOOTH[way], "delay": amount})
         return _rounded({"place": channel, "form": "lag", "lag": -amount if way == "early" else amount})
+    if kind == "clock":
+        starts = {full.partition("@")[2]: {"late": v} for full, (v, _) in linear.items() if "@" in full}
+        rates = [v for full, (v, _) in linear.items() if "@" not in full]
+        clock: Entry = {"place": channel, "form": kind} | ({"rate": rates[0]} if rates else {})
+        return _rounded(clock | ({**_means(starts), EACH: starts} if starts else {}))
     if kind == "crosstalk":
         ((pair, gain),) = values.items()
         return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})

@@ -1,9 +1,10 @@
 """Recordings with what was found in the measuring chain undone, as new files."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
 from ..io.sensors import calm_motion, without_spikes
+from ..resampled import before
 from ..switches import direction
-from .acquisition import GAIN_NAMES, RATE, drifting, full_range, rates, undone
+from .acquisition import CLOCKS, GAIN_NAMES, RATE, clock_names, drifting, full_range, rates, undone
 from .coordinates import COEFFICIENTS
 from .diagnose import Diagnosed
 from .point import Point
@@ -28,8 +30,8 @@ OF_THE_CHANNEL = ("frequency", "step_change", "pulse")
 def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[dict[str, Recording], list[str]]:
     """The recordings less the faults of their measuring chain, and what has been undone.
 
-    Lag, curve, drop, drift, gain, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of currents
-    and motion are replaced by what their neighbours say. What cannot be undone (held samples, converter steps,
+    Lag, clock, curve, drop, drift, gain, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of
+    currents and motion are replaced by what their neighbours say. What cannot be undone (held samples, converter steps,
     clipping) stays.
     """
     out, undone = {}, dict[str, None]()
@@ -60,6 +62,11 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
         if late:
             words = f"lag of the {', '.join(channel_in_words(u.removeprefix('~lag_')) for u in sorted(late))}"
             yield words, partial(_not_late, quantity=quantity, at=Point(values, name, ()))
+    for of, channels in CLOCKS.items():
+        if f"~clock_{of}" in told:
+            start, rate = (values.get(n, 0.0) for n in clock_names(of, name))
+            behind = start + rate * np.arange(1.0, size + 1.0)
+            yield f"clock of the {of} logger", partial(_on_time, channels=channels, late=behind)
     for quantity in ("voltage", "current"):
         if f"~curve_{quantity}" in told:
             bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
@@ -192,6 +199,13 @@ def _not_late(recording: Recording, quantity: str, at: Point) -> Recording:
     phases = [of(x, None if ends is None else ends[:, j], "abc"[j]) for j, x in enumerate(recording.phase_current.T)]
     means, *at_end = (np.column_stack(x) for x in zip(*phases, strict=True))
     return replace(recording, phase_current=means, phase_current_end=at_end[0] if at_end else None)
+
+
+def _on_time(recording: Recording, channels: Collection[str], late: np.ndarray) -> Recording:
+    """``late`` (sample,) intervals by which the channels' logger is."""
+    names = {"angle": "rotor_angle", "output": "output_position", "speed": "rotor_speed"}
+    signals: dict[str, Any] = {names[c]: before(getattr(recording, names[c]), -late) for c in channels}
+    return replace(recording, **signals)
 
 
 def _without_crosstalk(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:

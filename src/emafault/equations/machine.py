@@ -10,7 +10,18 @@ from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
 from ..effects.scaling import scaled
-from . import bus, commutation, control, electrical, position, sensor_current, sensor_speed, torque, waveform
+from . import (
+    bus,
+    commutation,
+    control,
+    electrical,
+    late_angle,
+    position,
+    sensor_current,
+    sensor_speed,
+    torque,
+    waveform,
+)
 from .coordinates import ALONG, COEFFICIENTS, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
 from .dual import Dual, value_of
 from .parameters import beyond_tolerance, controller, internal, measuring_chain, nuisances, unit_of
@@ -38,7 +49,6 @@ BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and o
 STANDS_OUT = 10.0  # of a channel's noise, for the scale of forms in it
 COEFFICIENT_SCALE = 0.02  # relative change of a coefficient, for the scale of its forms
 LARGE = 400_000  # samples of a bench, from which on what is easily computed anew is kept of one recording at a time
-LATE_ANGLE = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of an angle that lags, with their sides
 
 
 class ReferenceActuator:
@@ -66,7 +76,8 @@ class ReferenceActuator:
         self._disturbed: dict[str, Signals] = {}
         self._along: dict[tuple[str, str], dict[str, Any]] = {}
         self._functions: dict[str, dict[str, Any]] = {}
-        self._late: dict[str, dict[str, np.ndarray]] = {}  # by recording and equation, what a late angle takes out
+        #: by recording, term and equation, what a late angle takes out
+        self._late: dict[str, dict[int, dict[str, np.ndarray]]] = {}
         self.large = sum(r.size for r in self.recordings.values()) > LARGE
         self.left_out = tuple(exclude)
         self.effects = {k: e for k, e in self.catalogue.items() if k not in exclude}
@@ -152,15 +163,15 @@ class ReferenceActuator:
         """
         self.prepare(name, values)
         rec = self._noisy(name) if disturbed else self.recordings[name]
-        late = [n for n in LATE_ANGLE if wanted is None or n in wanted]
+        late = [n for n in late_angle.names(name) if wanted is None or n in wanted]
         less = dict(less or {})
-        lags = {n: values.get(n, 0.0) for n in LATE_ANGLE}
-        turned = _turned(self.recordings[name]) if late or any(lags.values()) else None
-        if turned is not None and any(lags.values()):
-            less["angle"] = less.get("angle", 0.0) - sum(_ahead(n, x) @ turned for n, x in lags.items())
+        ahead = late_angle.correction(values, name)
+        terms = late_angle.terms(self.recordings[name]) if late or ahead.any() else np.zeros((0, 0))
+        if ahead.any():
+            less["angle"] = less.get("angle", 0.0) - ahead @ terms
         blocks = self._recording(values, _less(rec, less), wanted)
-        if turned is not None and late:
-            self._add_late_angle(blocks, values, turned, late, less)
+        if late:
+            self._add_late_angle(blocks, values, terms, late, less)
         return blocks
 
     # ---- the measuring chain
@@ -168,23 +179,31 @@ class ReferenceActuator:
         self,
         blocks: Sequence[Block],
         values: Mapping[str, float],
-        turned: np.ndarray,
+        terms: np.ndarray,
         names: Sequence[str],
         less: Mapping[str, np.ndarray],
     ) -> None:
-        """Columns of the lag of an angle, which turns and is turned faster by so much in an interval (2, sample), to
-        blocks of a recording."""
+        """Columns of what an angle is late by, of the ``terms`` of ``late_angle``, to blocks of a recording."""
         name = blocks[0].recording
-        if name not in self._late:
-            if self.large:
-                self._late.clear()
-            self._late[name] = {e: -x for e, x in self.seen_in("angle", name, turned).items()}
+        by_name = late_angle.derivatives(values, name)
+        shares = np.array([by_name[n] for n in names])
+        used = np.flatnonzero(shares.any(axis=0))
+        if self.large and name not in self._late:
+            self._late.clear()
+        known = self._late.setdefault(name, {})
+        if new := [k for k in used.tolist() if k not in known]:
+            for equation, rows in self.seen_in("angle", name, terms[new]).items():
+                for k, row in zip(new, rows, strict=True):
+                    known.setdefault(k, {})[equation] = -row
         state = State(_less(self.recordings[name], less), Point(values, name, ()))
         for block in blocks:
-            shown = self._late[name].get(block.equation)
-            if shown is None:
-                shown = -_seen(state, block.equation, turned)
-            block.columns |= {n: _by_lag(n, values.get(n, 0.0)) @ shown for n in names}
+            if all(block.equation in known[k] for k in used.tolist()):
+                shown = np.array([known[k][block.equation] for k in used.tolist()])
+            else:
+                shown = -_seen(state, block.equation, terms[used])
+            for n, column in zip(names, shares[:, used] @ shown, strict=True):
+                # a logger may have channels that stand in the equation beside the angle
+                block.columns[n] = block.columns[n] + column if n in block.columns else column
 
     def channels(self, equation: str, driver: int) -> tuple[str, ...]:
         """Channels in which a form of a driver of an equation may lie, rather than in the equation itself."""
@@ -345,23 +364,6 @@ def _seen(state: State, equation: str, x: np.ndarray) -> np.ndarray:
         return np.array([sensor_speed.seen_rate(state, row) for row in x])
     rows = np.concatenate([commutation.rows_of(state, j) for j in range(3)])
     return state.rec.actuator.pole_pairs * x[:, rows] * commutation.by_angle(state)
-
-
-def _turned(rec: Signals) -> np.ndarray:
-    """(2, sample) by how much the angle changes in an interval, and by how much that changes (rad), the latter of a
-    smoothed angle: the noise of a second difference is that of the torque's equation."""
-    return np.array([np.gradient(rec.angle), rec.acceleration * rec.interval**2])
-
-
-def _ahead(name: str, lag: float) -> np.ndarray:
-    """(2,) what of these is to be added to an angle y that is recorded as (1 - l) y[n] + l y[n - 1], or with n + 1, to
-    the second order."""
-    return np.array([LATE_ANGLE[name] * lag, lag * lag - 0.5 * lag])
-
-
-def _by_lag(name: str, lag: float) -> np.ndarray:
-    """(2,) the same, differentiated."""
-    return np.array([LATE_ANGLE[name], 2.0 * lag - 0.5])
 
 
 def _known(state: State, equation: str) -> np.ndarray | bool:

@@ -29,6 +29,7 @@ DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
 FAR_OUT = 100.0  # of a channel's noise, for the scale of its offset
 WARM = 30.0  # K, by which a machine may not have the recorded ambient temperature
 GAIN = 0.02  # relative, by which a channel's gain may change from one recording to the next, or along one
+CLOCK = 1e-3  # relative, by which a logger's clock may be slow or fast
 SKEW = 1e-6  # s, by which channels may be sampled apart
 AMBIENT = 0.5  # K, of the measured ambient temperature
 GAIN_PRIOR = 0.3  # relative, of the controller's gains
@@ -179,6 +180,7 @@ def measuring_chain(
         shows = _shows(channel.partition("_")[0] if channel in phases else channel)
         among = float(len(channels))
         out.append(Unit(f"~lag_{channel}", "form", shows, variants, among=among, alike=bool(set(MADE) & set(ways))))
+    out += _clocks(recordings)
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):
@@ -193,6 +195,20 @@ def measuring_chain(
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
         out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
     return out + _drifts(recordings, reference)
+
+
+def _clocks(recordings: Collection[str]) -> list[Unit]:
+    """Loggers that have channels of their own: late by another amount in each recording, with a clock that is not that
+    of the others, or both."""
+    out = []
+    for of, channels in acquisition.CLOCKS.items():
+        both = [acquisition.clock_names(of, n) for n in recordings]
+        starts = [Parameter(start, 0.0, 0.0, 1.0, "interval") for start, _ in both]
+        rate = Parameter(both[0][1], 0.0, 0.0, CLOCK, "1")
+        shows = tuple(dict.fromkeys(e for c in channels for e in _shows(c)))
+        variants = [Variant(starts), Variant([rate]), Variant([*starts, rate])]
+        out.append(Unit(f"~clock_{of}", "form", shows, variants, among=float(len(acquisition.CLOCKS))))
+    return out
 
 
 def _late(channel: str, way: str, least: float = 0.0) -> Variant:

@@ -11,6 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
+from ..diagnosis.described import PRIOR
 from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.recording import Recording
@@ -346,7 +347,7 @@ def angle_timing(recordings: Sequence[Recording]) -> tuple[float, float]:
 
     An error of the angle is in its rate in one interval and, with the other sign, in the next, where no error of the
     recorded speed is: by the product of both, less the speed, in proportion to the square of the speed. By weighted
-    least squares; there is none where Schwarz's criterion says so.
+    least squares; there is none where Schwarz's criterion says so, by the odds of a described form before the data.
     """
     of, squares = [], []
     for r in (calm_motion(r) for r in recordings):
@@ -365,7 +366,7 @@ def angle_timing(recordings: Sequence[Recording]) -> tuple[float, float]:
         found = inverse @ (white.T @ (y / size))
         size = np.maximum(columns @ np.maximum(found, 0.0), 1e-3 * float(np.mean(np.abs(y))))
     spread = float(np.sqrt(np.mean(((y - columns @ found) / size) ** 2) * inverse[1, 1]))
-    if found[1] <= 0.0 or (found[1] / spread) ** 2 < np.log(len(y)):
+    if found[1] <= 0.0 or 0.5 * (found[1] / spread) ** 2 + PRIOR < 0.5 * np.log(len(y)):
         return 0.0, 0.0
     return float(np.sqrt(found[1])), float(np.sqrt(max(found[0], 0.0)))
 

@@ -19,6 +19,7 @@ CHANNELS = {
     "bus_voltage": "bus voltage",
     SENSOR: "speed sensor's",
 }  # words of those that have others
+LOGGERS = {"positions": "logger of angle and output position", "motion": "logger of angle, output position and speed"}
 CONTROLLER = {
     "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
     "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
@@ -184,8 +185,19 @@ def _lag(fault: Fault) -> Told:
     return Told(f"the {fault.whose} {LATE[way].format(f'{amount:.2g} intervals')}{also}", "lag")
 
 
+def _clock(fault: Fault) -> Told:
+    starts = [v for n, v in fault.values.items() if "@" in n]
+    parts = [f"comes late by {min(starts):z.2g} to {max(starts):z.2g} intervals"] if starts else []
+    parts += [
+        f"has a clock that is {'slow' if v > 0.0 else 'fast'} by {1e6 * abs(v):.3g} ppm"
+        for n, v in fault.values.items() if "@" not in n
+    ]  # fmt: skip
+    whose = LOGGERS.get(fault.channel, fault.whose)
+    return Told(f"the {whose} {' and '.join(parts)}{', another one in each recording' * bool(starts)}", "clock")
+
+
 KINDS: dict[str, Callable[[Fault], Told]] = {
-    "lag": _lag, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift, "gain": _gain,
-    "scale": _scale, "harmonics": _harmonics,
+    "lag": _lag, "clock": _clock, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift,
+    "gain": _gain, "scale": _scale, "harmonics": _harmonics,
     "ambient": _ambient, "controller": _controller,
 }  # fmt: skip

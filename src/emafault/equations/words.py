@@ -113,6 +113,8 @@ def _of_group(group: str, short: str) -> str:
     chain = {
         "ambient": "temperature at the start above the recorded ambient one",
         "skew": f"{short} channel is sampled late by",
+        "clock": f"{short} is recorded late by",
+        "clock_rate": f"{short} is recorded by a clock that is slow by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short.replace('_', ', ')}",
         "lag": f"{channel_in_words(late)} {_late(short.rpartition('_')[2])}",

@@ -1,0 +1,68 @@
+"""An angle that is recorded late: what is to be added to it, to the second order of the lag.
+
+Terms of the signals g, by how much the recorded angle changes in an interval, b, by how much that changes, and w, the
+first of a smoothed angle; t is the time, all in intervals. A second difference and a change that grows with time are
+taken of a smoothed angle: the noise of the recorded one is that of the torque's equation.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .acquisition import CLOCKS, clock_names
+from .signals import Signals
+
+LAGS = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of all recordings alike, with their sides
+TERMS = 6  # g, b, w, t w, t b, t^2 b
+
+
+def names(recording: str) -> tuple[str, ...]:
+    """Parameters that a recording's angle may be late by."""
+    return (*LAGS, *(n for of in _loggers() for n in clock_names(of, recording)))
+
+
+def terms(rec: Signals) -> np.ndarray:
+    """(TERMS, sample) signals (rad)."""
+    h = rec.interval
+    t = np.arange(1.0, rec.size + 1.0)
+    bend = rec.acceleration * h**2
+    turned = rec.speed * h + 0.5 * bend
+    return np.array([np.gradient(rec.angle), bend, turned, t * turned, t * bend, t * t * bend])
+
+
+def correction(values: Mapping[str, float], recording: str) -> np.ndarray:
+    """(TERMS,) coefficients of what is to be added to the recorded angle.
+
+    One that is late by a share l is recorded as (1 - l) y[n] + l y[n - 1], or with n + 1, one of another logger as it
+    was a time before.
+    """
+    out = np.zeros(TERMS)
+    for name, side in LAGS.items():
+        lag = values.get(name, 0.0)
+        out[:2] += side * lag, lag * lag - 0.5 * lag
+    start, rate = _behind(values, recording)
+    out += 0.0, 0.5 * start * start, start, rate, start * rate, 0.5 * rate * rate
+    return out
+
+
+def derivatives(values: Mapping[str, float], recording: str) -> dict[str, np.ndarray]:
+    """(TERMS,) the same coefficients, differentiated by each parameter."""
+    out = {name: np.zeros(TERMS) for name in names(recording)}
+    for name, side in LAGS.items():
+        out[name][:2] = side, 2.0 * values.get(name, 0.0) - 0.5
+    start, rate = _behind(values, recording)
+    for of in _loggers():
+        by_start, by_rate = clock_names(of, recording)
+        out[by_start][1:5] = start, 1.0, 0.0, rate
+        out[by_rate][3:] = 1.0, start, rate
+    return out
+
+
+def _loggers() -> list[str]:
+    return [of for of, channels in CLOCKS.items() if "angle" in channels]
+
+
+def _behind(values: Mapping[str, float], recording: str) -> tuple[float, float]:
+    """Intervals by which an angle of another logger is late at the start, and by which that grows in each."""
+    both = [[values.get(n, 0.0) for n in clock_names(of, recording)] for of in _loggers()]
+    return tuple(np.sum(both, axis=0).tolist())  # type: ignore[return-value]
