@@ -99,6 +99,20 @@ def test_channels_faults(true):
     np.testing.assert_allclose(growing, np.outer(0.01 * share * v[:, 1], [0, 1, 0]), atol=1e-12)
 
 
+def test_a_logger_has_a_clock_of_its_own(true):
+    """Late by an amount that grows with time, all that it records alike; instants that scatter by themselves."""
+    n = np.arange(1000)
+    got = changed(true, place="positions", form="clock", late=0.5, rate=2e-3)
+    assert set(got) == {"rotor_angle", "output_position"}
+    angle = true["rotor_angle"][0]
+    wanted = np.interp(n - 0.5 - 2e-3 * (n + 1.0), n, angle)
+    np.testing.assert_allclose((angle + got["rotor_angle"])[1:], wanted[1:], atol=2e-4)
+    scattered = changed(true, place="angle", form="clock", scatter=2e-5)["rotor_angle"]
+    fast = np.abs(true["rotor_speed"][0]) > 50.0
+    assert np.std((scattered / true["rotor_speed"][0])[fast]) == pytest.approx(2e-5, rel=0.1)
+    assert set(changed(true, place="motion", form="clock", rate=1e-3)) == {"rotor_speed", *got}
+
+
 def test_samples(true):
     i = true["phase_current"][0]
     cut = changed(true, place="current_a", form="clipping", level=0.5)["phase_current"]
@@ -111,7 +125,7 @@ def test_samples(true):
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
         "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "gain", "drop", "drift", "clipping", "adc_step",
-        "held", "hold", "spikes",
+        "held", "hold", "spikes", "clock",
     }  # fmt: skip
 
 

@@ -223,6 +223,15 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"emf.h3": -0.02, "emf.h11": 0.004},
             {"place": "emf", "form": "harmonics", "h3": -0.02, "h11": 0.004},
         ),
+        ("~clock_angle", {"clock_rate.angle": 2e-4}, {"place": "angle", "form": "clock", "rate": 2e-4}),
+        (
+            "~clock_motion",
+            {"clock.motion@one.nc": 0.2, "clock.motion@two.nc": 0.6, "clock_rate.motion": -1e-4},
+            {
+                "place": "motion", "form": "clock", "late": 0.4, "rate": -1e-4,
+                "recordings": {"one.nc": {"late": 0.2}, "two.nc": {"late": 0.6}},
+            },
+        ),
         ("~scale_output", {"gain_output.recorder": 0.01}, {"place": "output", "form": "gain", "gain": 0.01}),
         (
             "~gain_current",

@@ -14,6 +14,8 @@ from emafault.io.recording import read_recording
 
 from .conftest import ACTUATOR, COGGING, NOISE, bench, recorded, verdict_of
 
+NAMED = {"r0.nc": "parabolic", "r1.nc": "reversal", "r2.nc": "sine", "r3.nc": "parabolic"}
+
 
 def test_an_effect_is_named_beside_a_lag_of_the_voltage():
     late = {}
@@ -62,6 +64,43 @@ def test_a_bent_curve_of_the_voltages_is_told_and_undone(tmp_path):
     for name, r in true.items():
         got = read_recording(tmp_path / "new" / name)
         assert np.std(got.phase_voltage - r.phase_voltage) < 0.1 * np.std(faulty[name].phase_voltage - r.phase_voltage)
+
+
+def test_an_effect_is_named_beside_instants_that_scatter():
+    """Noise of the angle that goes with the speed, where all noise was taken for the same, was a voltage's gain."""
+    scatter = {"place": "angle", "form": "clock", "scatter": 1e-5}
+    faulty = {n: recorded(c, COGGING, seed=k, theta_0=k, unlisted=[scatter]) for k, (n, c) in enumerate(NAMED.items())}
+    verdict = verdict_of(faulty)
+    assert (verdict["verdict"], verdict["which"][0]["effects"]) == ("partly", ["cogging"])
+    (told,) = verdict["discovered"]
+    assert (told["form"], told["equation"]) == ("clock", "sensor_angle")
+    assert told["parameters"]["scatter"]["value"] == pytest.approx(1e-5, rel=0.05)
+    assert told["term"] == {"place": "angle", "form": "clock", "scatter": pytest.approx(1e-5, rel=0.05)}
+
+
+@pytest.mark.parametrize(
+    ("starts", "rate"), [((0.0,) * 4, 3e-4), ((0.1, 0.8, -0.3, 0.5), 0.0), ((0.1, 0.8, -0.3, 0.5), -2e-4)]
+)
+def test_a_logger_with_a_clock_of_its_own_is_told_and_undone(starts, rate):
+    true, faulty = {}, {}
+    for k, (name, command) in enumerate(NAMED.items()):
+        clock = {"place": "positions", "form": "clock", "late": starts[k], "rate": rate}
+        true[name] = recorded(command, COGGING, seed=k, theta_0=k)
+        faulty[name] = recorded(command, COGGING, seed=k, theta_0=k, unlisted=[clock])
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = found.verdict["discovered"]
+    assert (told["unit"], told["form"], told["equation"]) == ("~clock_positions", "clock", "sensor_angle")
+    for parameter, number in told["parameters"].items():
+        at = starts[names.index(parameter.partition("@")[2])] if "@" in parameter else rate
+        assert number["value"] == pytest.approx(at, abs=0.02 if "@" in parameter else 1e-5), parameter
+    assert found.verdict["shrinks"]["signal"]["closed"] > 0.95
+    undone, what = corrected(found, faulty)
+    assert what == ["clock of the positions logger"]
+    for name, r in undone.items():
+        off = (r.rotor_angle - true[name].rotor_angle)[5:-5]
+        assert np.std(off) < 0.1 * np.std(faulty[name].rotor_angle - true[name].rotor_angle) + 2.0 * NOISE.angle
 
 
 def test_an_angle_that_is_early_is_told_and_undone(tmp_path):

@@ -24,6 +24,16 @@ def test_stated_noise_is_taken_where_every_recording_states_it():
     assert stated.voltage == pytest.approx((0.5 * (0.09 + 0.16)) ** 0.5) and stated.current == own.current
 
 
+def test_instants_that_scatter_are_noise_in_proportion_to_the_speed():
+    scatter = [{"place": "angle", "form": "clock", "scatter": 1e-5}]
+    named = [[recorded(c, seed=n, unlisted=u) for n, c in enumerate(("parabolic", "sine"))] for u in ([], scatter)]
+    plain, faulty = (estimated_noise(recordings, NOISE) for recordings in named)
+    assert plain.angle_timing == 0.0
+    assert faulty.angle_timing == pytest.approx(1e-5, rel=0.05) and faulty.angle == pytest.approx(1e-4, rel=0.1)
+    signals = Signals.of("a.nc", named[1][0], ACTUATOR, faulty)
+    np.testing.assert_allclose(signals.angle_noise, np.hypot(faulty.angle, faulty.angle_timing * signals.speed))
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.05, 0.5])
 def test_the_currents_noise_is_found_whatever_their_offsets(offset):
     of_unit = {"current_offset": {"o_a": offset, "o_b": -0.6 * offset, "o_c": 0.3 * offset}}

@@ -23,6 +23,8 @@ ALONG = ((0, 1, 2, 3, 15), (0, 4), (0, 5, 14, 16, 17), (0, 6, 7, 8, 9, 10, 11, 1
 SMOOTH = 3  # functions of the speed that an own form has
 #: functions of an own form along one coordinate: speed, current, time and temperature, angle
 OWN_ALONG = ((0, 1, 2, 3, 4), (0, 5), (0, 6, 15), (0, 7, 8, 9, 10, 11, 12, 13, 14))
+#: the same of the control equation, whose own forms lack the current, which is what it measures
+OWN_OF_CONTROL = ((0, 1, 2, 3, 4), (0, 5, 14), (0, 6, 7, 8, 9, 10, 11, 12, 13))
 #: times that rows are averaged over an interval, where not once: a second difference is a mean of means
 AVERAGED = {"torque": 2, "position": 0}
 SLOW = 8.0  # rad/s, scale of the range of low speeds, where friction changes most

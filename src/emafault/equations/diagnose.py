@@ -106,7 +106,7 @@ def diagnose(
         fit = bench.fit((begun, begun.fit()))
     else:
         fit = bench.fit()
-    quality = {n: seen(recordings[n], exclude) for n in explore}
+    quality = {n: seen(recordings[n], exclude, own.angle_timing) for n in explore}
     counted = bool(told(quality))
     reading = read(
         fit.models, fit.search.units.values(), tuple(machine.observed()), counted=counted,
@@ -128,7 +128,7 @@ def diagnose(
     explored = Explored(bench, fit, Ladder(every, confirm))
     models, held_out = held_to_account(every, all_fit, named, explored, wanders)
     all_fit = replace(all_fit, models=models)
-    quality = {n: quality[n] if n in quality else seen(r, exclude) for n, r in recordings.items()}
+    quality |= {n: seen(r, exclude, own.angle_timing) for n, r in recordings.items() if n not in quality}
     beyond = {e: max(odds, wanders.get(e, -np.inf)) for e, odds in misfits(held_out).items()}
     final = read(models, units, observed, counted=bool(told(quality)), wandering=wanders | beyond)
     fitted = Fitted(whole, every, all_fit, final, held_out)

@@ -22,7 +22,16 @@ from . import (
     torque,
     waveform,
 )
-from .coordinates import ALONG, COEFFICIENTS, OWN_ALONG, coordinates_of, drivers_of, functions_of, rows_of
+from .coordinates import (
+    ALONG,
+    COEFFICIENTS,
+    OWN_ALONG,
+    OWN_OF_CONTROL,
+    coordinates_of,
+    drivers_of,
+    functions_of,
+    rows_of,
+)
 from .dual import Dual, value_of
 from .parameters import beyond_tolerance, controller, internal, measuring_chain, nuisances, unit_of
 from .point import Point, State, effect_name
@@ -111,7 +120,9 @@ class ReferenceActuator:
         return () if equation in SETTINGS else ALONG
 
     def own_families(self, equation: str) -> tuple[tuple[int, ...], ...]:
-        """Functions of an own form that go along one coordinate; none of the controller's equations."""
+        """Functions of an own form that go along one coordinate; none of the commutations."""
+        if equation == "control":
+            return OWN_OF_CONTROL
         return () if equation in SETTINGS else OWN_ALONG
 
     def observed(self) -> dict[str, dict[str, float]]:

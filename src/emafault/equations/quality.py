@@ -12,7 +12,7 @@ from ..io.lattice import lattice_step
 from ..io.recording import Recording
 from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
 from ..io.updates import repeated, updates
-from .signals import MAY_BE_SLOWER, angle_timing
+from .signals import MAY_BE_SLOWER
 
 #: variable -> equation, words, unit, and place in a configuration's ``unlisted``
 CHANNELS = {
@@ -51,9 +51,14 @@ class Channel:
     scatter: float = 0.0
 
 
-def seen(recording: Recording, lacking: Collection[str] = ()) -> dict[str, Channel]:
-    """What the channels of a recording show, those that it has of ``CHANNELS``; ``lacking``: effects of the catalogue
-    that the library at hand has not."""
+def seen(recording: Recording, lacking: Collection[str] = (), scatter: float = 0.0) -> dict[str, Channel]:
+    """What the channels of a recording show, those that it has of ``CHANNELS``.
+
+    Parameters
+    ----------
+    lacking : effects of the catalogue that the library at hand has not
+    scatter : of the instants at which the angle is sampled (s), which all recordings together tell
+    """
     out = {}
     cut = cut_off(recording)
     for channel in CHANNELS:
@@ -71,7 +76,7 @@ def seen(recording: Recording, lacking: Collection[str] = ()) -> dict[str, Chann
         if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := resting_noise([recording])):
             out[channel] = replace(out[channel], noise=noise)
         if channel == "rotor_angle":
-            out[channel] = replace(out[channel], scatter=angle_timing([recording])[0])
+            out[channel] = replace(out[channel], scatter=scatter)
         if channel in BY_STEPS and BY_STEPS[channel] not in lacking:
             out[channel] = replace(out[channel], step=0.0, held=0.0)
     return out
