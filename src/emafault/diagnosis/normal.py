@@ -11,7 +11,7 @@ from .evidence import Definite, Normal, Reduced, marginalise
 from .forked import Workers
 from .linear import OWN_FORM, OWN_SHARES, OwnForm, White, assemble, full_model, function_of, white_rows
 from .linearisation import Carried, Linearisation, Task
-from .model import Parameter, Unit, Variant
+from .model import SETTINGS, Parameter, Unit, Variant
 from .point import Point, is_parameter
 from .sets import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
 
@@ -252,8 +252,11 @@ class NormalEquations(Point):
             if n.startswith("remainder."):
                 left.setdefault(n.split(".")[1], ([], []))["@" in n].append(k)
         for equation, kinds in left.items():
-            # the same in all recordings, or another in each
-            each = [np.array(k) for k in kinds if k]
+            # the same in all recordings, or another in each; a controller's coefficients are its own business in both
+            same, another = kinds
+            if equation in SETTINGS and another:
+                another = [*another, *(k for k in same if reduced.names[k].split(".")[2] != "0")]
+            each = [np.array(k) for k in (same, another) if k]
             if kinds[0]:
                 where = {k: reduced.names[k].split(".")[2:] for k in kinds[0]}
                 for family in self.machine.families(equation):
