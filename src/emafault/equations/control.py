@@ -62,17 +62,18 @@ def residual(state: State) -> Dual:
     # present sample too, which makes up for the time that a demand is in force
     integral = error.linear(lambda x: np.cumsum(x) * h + (lead - 0.5 * h) * x, rec.size)
     gain = p("controller.speed_gain")
-    asked_for = gain * error + p("controller.speed_integral_gain") * integral
+    # solved for the speed's error, which the noise lies on: a smaller gain must not make the noise smaller
+    asked_for = error + p("controller.speed_integral_gain") / gain * integral
     late: Dual | float = p(f"controller.timing@{rec.name}") + h * late_by(p, "current")
     for m in with_hook("delay"):
         late = late + m.delay(p.of(effect_name(m)))
     sign = np.sign(sum(np.asarray(state.conducting[j].value) * rec.current[:, j] for j in range(3)))
     flowing = (_level(state) - _beyond(state)) * sign + _sensors_show(state)
-    flowing = flowing.linear(lambda x: _calmed(x, h), rec.size)
+    flowing = flowing.linear(lambda x: _calmed(x, h), rec.size) / gain
     # the current changes as the demand does, and is known with less noise
     asked_for = asked_for - late * np.gradient(np.asarray(value_of(flowing)), h)
     width = block_length(rec)
-    out = flowing - asked_for
+    out = a.speed_gain * (flowing - asked_for)
     return out.linear(lambda x: _blocks(x, width), rec.size)
 
 
