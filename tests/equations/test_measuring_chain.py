@@ -79,7 +79,12 @@ def test_an_effect_is_named_beside_instants_that_scatter():
 
 
 @pytest.mark.parametrize(
-    ("starts", "rate"), [((0.0,) * 4, 3e-4), ((0.1, 0.8, -0.3, 0.5), 0.0), ((0.1, 0.8, -0.3, 0.5), -2e-4)]
+    ("starts", "rate"),
+    [
+        ((0.0,) * 4, 3e-4),
+        pytest.param((0.1, 0.8, -0.3, 0.5), 0.0, marks=pytest.mark.long),
+        pytest.param((0.1, 0.8, -0.3, 0.5), -2e-4, marks=pytest.mark.long),
+    ],
 )
 def test_a_logger_with_a_clock_of_its_own_is_told_and_undone(starts, rate):
     true, faulty = {}, {}
@@ -122,6 +127,7 @@ def test_an_angle_that_is_early_is_told_and_undone(tmp_path):
         assert np.std(got.rotor_angle - r.rotor_angle) < 0.1 * np.std(late[name].rotor_angle - r.rotor_angle)
 
 
+@pytest.mark.long
 def test_currents_that_lag_are_told():
     def lagging(x):
         return x + 0.7 * (np.vstack([x[:1], x[:-1]]) - x)

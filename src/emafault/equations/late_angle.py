@@ -1,8 +1,7 @@
 """An angle that is recorded late: what is to be added to it, to the second order of the lag.
 
-Terms of the signals g, by how much the recorded angle changes in an interval, b, by how much that changes, and w, the
-first of a smoothed angle; t is the time, all in intervals. A second difference and a change that grows with time are
-taken of a smoothed angle: the noise of the recorded one is that of the torque's equation.
+Terms of the signals w, by how much a smoothed angle changes in an interval, and b, by how much that changes; t is the
+time, all in intervals. The noise of the recorded angle is that of the equations, which differences of it would add to.
 """
 
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from .acquisition import CLOCKS, clock_names
 from .signals import Signals
 
 LAGS = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of all recordings alike, with their sides
-TERMS = 6  # g, b, w, t w, t b, t^2 b
+TERMS = 5  # w, b, t w, t b, t^2 b
 
 
 def names(recording: str) -> tuple[str, ...]:
@@ -27,7 +26,7 @@ def terms(rec: Signals) -> np.ndarray:
     t = np.arange(1.0, rec.size + 1.0)
     bend = rec.acceleration * h**2
     turned = rec.speed * h + 0.5 * bend
-    return np.array([np.gradient(rec.angle), bend, turned, t * turned, t * bend, t * t * bend])
+    return np.array([turned, bend, t * turned, t * bend, t * t * bend])
 
 
 def correction(values: Mapping[str, float], recording: str) -> np.ndarray:
@@ -41,7 +40,7 @@ def correction(values: Mapping[str, float], recording: str) -> np.ndarray:
         lag = values.get(name, 0.0)
         out[:2] += side * lag, lag * lag - 0.5 * lag
     start, rate = _behind(values, recording)
-    out += 0.0, 0.5 * start * start, start, rate, start * rate, 0.5 * rate * rate
+    out += start, 0.5 * start * start, rate, start * rate, 0.5 * rate * rate
     return out
 
 
@@ -53,8 +52,8 @@ def derivatives(values: Mapping[str, float], recording: str) -> dict[str, np.nda
     start, rate = _behind(values, recording)
     for of in _loggers():
         by_start, by_rate = clock_names(of, recording)
-        out[by_start][1:5] = start, 1.0, 0.0, rate
-        out[by_rate][3:] = 1.0, start, rate
+        out[by_start][:4] = 1.0, start, 0.0, rate
+        out[by_rate][2:] = 1.0, start, rate
     return out
 
 

@@ -198,15 +198,17 @@ def measuring_chain(
 
 
 def _clocks(recordings: Collection[str]) -> list[Unit]:
-    """Loggers that have channels of their own: late by another amount in each recording, with a clock that is not that
-    of the others, or both."""
+    """Loggers that have channels of their own, with a clock that is not that of the others; one of several channels may
+    be late by another amount in each recording, beside it or instead."""
     out = []
     for of, channels in acquisition.CLOCKS.items():
         both = [acquisition.clock_names(of, n) for n in recordings]
         starts = [Parameter(start, 0.0, 0.0, 1.0, "interval") for start, _ in both]
         rate = Parameter(both[0][1], 0.0, 0.0, CLOCK, "1")
         shows = tuple(dict.fromkeys(e for c in channels for e in _shows(c)))
-        variants = [Variant(starts), Variant([rate]), Variant([*starts, rate])]
+        variants = [Variant([rate])]
+        if len(channels) > 1:  # of one channel, a share of an interval is a lag first of all
+            variants += [Variant(starts), Variant([*starts, rate])]
         out.append(Unit(f"~clock_{of}", "form", shows, variants, among=float(len(acquisition.CLOCKS))))
     return out
 
