@@ -25,6 +25,7 @@ from emafault.actuator.parameters import ActuatorParameters
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
 from emafault.io.recording import Recording, read_recording, write_recording
+from emafault.resampled import before
 
 EFFECTS = {
     "none": (), "contact_resistance": ("effects.contact_resistance.R_x_a=0.04",),
@@ -188,6 +189,17 @@ def with_hum(r: Recording, n: int) -> Recording:
     return replace(r, phase_voltage=r.phase_voltage + 0.2 * np.sin(2.0 * np.pi * 50.0 * r.time + 2.0 * n)[:, None])
 
 
+def with_hum_of_currents(r: Recording, n: int) -> Recording:
+    """Each current with a wave of 50 Hz of its own phase, which is another one in each recording."""
+    wave = 0.03 * np.sin(2.0 * np.pi * 50.0 * r.time[:, None] + n + np.array([0.3, 2.0, 4.5]))
+    return replace(r, phase_current=r.phase_current + wave, phase_current_end=r.phase_current_end + wave)
+
+
+def late_by_recording(x: np.ndarray, n: int) -> np.ndarray:
+    """A signal that is up to an interval late, by another share in each recording."""
+    return before(x, np.full(len(x), 0.5 + 0.5 * each(n)))
+
+
 CHANNELS = {
     "currents in steps of 20 mA": Channel(in_steps("current", 0.02), ("adc_step in sensor_current",)),
     "currents in steps of 50 mA": Channel(in_steps("current", 0.05), ("adc_step in sensor_current",)),
@@ -258,6 +270,21 @@ CHANNELS = {
     ),
     "speed's noise averaged over five samples": Channel(noisier(0.02, "speed"), change=with_averaged_noise),
     "angle new in one sample of five": changed(rotor_angle=lambda x, n: held(x, 5)),
+    "hum of the currents": Channel(itself=("frequency in sensor_current",) * 3, change=with_hum_of_currents),
+    "instants of the angle that scatter by 10 us": Channel(
+        entry("angle", "clock", scatter=1e-5), ("clock in sensor_angle",)
+    ),
+    "positions of a clock 200 ppm slow": Channel(entry("positions", "clock", rate=2e-4), ("clock in sensor_angle",)),
+    "positions late by recording": changed(
+        "clock in sensor_angle", rotor_angle=late_by_recording, output_position=late_by_recording
+    ),
+    "back-EMF that goes down with the current": Channel(
+        (
+            "unlisted=[{place: back_emf, form: function, along: current, from: 0.0, to: 6.0, "
+            "values: [0.0, -0.004, -0.017, -0.039, -0.069, -0.108]}]",
+        ),
+        ("coefficient in electrical",),
+    ),
     "three waves of a bearing": Channel(
         entries(*(
             ("torque", "order", {"order": 3.57 * k, "amplitude": 0.005 - 0.001 * k, "phase": k}) for k in (1, 2, 3)
