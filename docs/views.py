@@ -411,7 +411,7 @@ FORM_VIEWS = {
     "function": FormView(
         "speed",
         {"coordinate": 0.0, "from": -160.0, "to": 160.0},
-        tuple(function.SHAPES.T @ (FORM_SIZE * np.array([0.6, -0.8, 0.4, 0.8, -0.4, -0.6]))),
+        tuple(function.BALANCED.T @ (FORM_SIZE * np.array([0.6, -0.8, 0.4, 0.8, -0.4, -0.6]))),
         "a smooth curve through six values",
         "It has one value for each speed (or current, output angle, time, temperature), but no simple law.",
     ),

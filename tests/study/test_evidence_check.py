@@ -67,7 +67,7 @@ def test_a_wrong_noise_fails(bench):
 
 
 def test_wrong_widths_fail(bench):
-    p, _ = worst(found(bench, 40, width=5.0))
+    p, _ = worst(found(bench, 60, width=5.0))
     assert p < 1e-3
 
 
