@@ -1,8 +1,8 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
 Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
-filter, clocks of their own, and drift; the sensors' noise; then spikes, held samples, a channel slower
-than the recording, clipping and the converter's steps.
+filter, a clock of its own, and drift; the sensors' noise; then spikes, held samples, a channel slower than the
+recording, clipping and the converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from ..first_order import filtered, smoothed
 from ..resampled import before
 from ..switches import direction
-from .grammar import CONTROLLER, FACTORS, MACHINE, PHASES, SHAPE, SHAPES, of_recording
+from .grammar import CONTROLLER, FACTORS, LOGGERS, MACHINE, PHASES, SHAPE, SHAPES, of_recording
 from .motor import AXIS, trapezoid
 from .unlisted import PLACES, drawn_phase, followed, row_of
 
@@ -22,22 +22,13 @@ Signals = dict[str, np.ndarray]
 RECORDED = {
     "voltage": ("phase_voltage",), "current": ("phase_current", "phase_current_end"), "speed": ("rotor_speed",),
     "angle": ("rotor_angle",), "output": ("output_position",), "bus": ("bus_voltage",),
-    "positions": ("rotor_angle", "output_position"), "motion": ("rotor_speed", "rotor_angle", "output_position"),
 }  # fmt: skip
+RECORDED |= {of: tuple(n for c in channels for n in RECORDED[c]) for of, channels in LOGGERS.items()}
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
 LATE = ("lag", "smoothing", "low_pass")
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
-ORDER = (
-    "",
-    "gain",
-    "sensor_curve",
-    "drop",
-    "crosstalk",
-    *LATE,
-    "clock",
-    "drift",
-    *AFTER_NOISE,
-)  # of the forms, shapes first
+#: of the forms, shapes first
+ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "clock", "drift", *AFTER_NOISE)
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 

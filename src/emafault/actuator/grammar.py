@@ -19,11 +19,13 @@ MACHINE = {
 }  # fmt: skip
 #: the shape of the back-EMF of all phases, each along its own electrical angle -> unit of what a form adds to it
 SHAPE = {"emf": "1"}
-#: channel of the measuring chain -> its unit; without a phase, that of all three; both positions, and the speed too
+#: several channels that another logger may record, with a clock that is not that of the rest
+LOGGERS = {"positions": ("angle", "output"), "motion": ("angle", "output", "speed")}
+#: channel of the measuring chain -> its unit; without a phase, that of all three
 CHANNELS = {
     "voltage": "V", **{f"voltage_{j}": "V" for j in PHASES}, "current": "A", **{f"current_{j}": "A" for j in PHASES},
     "speed": "rad/s", "angle": "rad", "output": "rad", "bus_voltage": "V",
-    "positions": "1", "motion": "1",
+    **dict.fromkeys(LOGGERS, "1"),
 }  # fmt: skip
 #: what multiplies a signal in the measuring chain -> its unit: a channel's relative gain, a voltage in proportion to
 #: speed times the shape of the back-EMF, an output position in proportion to the direction or the acceleration
@@ -95,7 +97,7 @@ def forms_at(place: str) -> list[str]:
         return list(OF_CONTROLLER)
     if place in SHAPE:
         return list(OF_SHAPE)
-    if place in ("positions", "motion"):
+    if place in LOGGERS:
         return ["clock"]
     shapes = [form for form in SHAPES if form != "travel" or place == "torque"]
     if place not in CHANNELS:

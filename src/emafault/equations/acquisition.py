@@ -11,20 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..actuator.grammar import LOGGERS
 from ..actuator.parameters import ActuatorParameters
 from ..first_order import LEAST, ahead, filtered, response, smoothed
 from ..switches import direction, turning
 from .dual import Dual, Number
 from .point import Point, effect_name
-from .signals import Signals
+from .signals import AROUND, Signals
 from .terms import with_hook
 
 #: logger -> channels that it may have of its own, with a clock that is not that of the rest
-CLOCKS = {
-    "angle": ("angle",), "output": ("output",), "speed": ("speed",), "positions": ("angle", "output"),
-    "motion": ("angle", "output", "speed"),
-}  # fmt: skip
-AROUND = 9  # samples, that a speed is averaged over where it is told how fast it changes
+CLOCKS = {channel: (channel,) for channel in ("angle", "output", "speed")} | LOGGERS
 OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage or current may lag by itself
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording

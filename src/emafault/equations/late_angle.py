@@ -63,5 +63,5 @@ def _loggers() -> list[str]:
 
 def _behind(values: Mapping[str, float], recording: str) -> tuple[float, float]:
     """Intervals by which an angle of another logger is late at the start, and by which that grows in each."""
-    both = [[values.get(n, 0.0) for n in clock_names(of, recording)] for of in _loggers()]
-    return tuple(np.sum(both, axis=0).tolist())  # type: ignore[return-value]
+    start, rate = np.sum([[values.get(n, 0.0) for n in clock_names(of, recording)] for of in _loggers()], axis=0)
+    return float(start), float(rate)

@@ -26,7 +26,7 @@ STANDS = 3e-3  # s, to either side, over which the angle of a rotor that stands 
 AVERAGED_AT_REST = 2e-2  # s
 STRETCH = 12  # samples, that an error of rounding changes evenly over, from which it is none of the noise's
 STRETCHES = 30  # in a recording
-AROUND = 9  # samples, that what is left of a speed is taken against the mean of
+AROUND = 9  # samples, that a noisy speed is averaged over
 QUIETEST = 0.2  # of the noise of the nominal sensors, that recordings may have
 #: channels that may be slower than the recording -> variable
 MAY_BE_SLOWER = {"speed": "rotor_speed", "output": "output_position", "bus": "bus_voltage"}
@@ -337,7 +337,7 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
             if np.isfinite(v)
         }
         | _stated(recordings),
-        angle_timing=max(timing, nominal.angle_timing),
+        angle_timing=timing,
     )
 
 

@@ -187,13 +187,14 @@ def _lag(fault: Fault) -> Told:
 
 def _clock(fault: Fault) -> Told:
     starts = [v for n, v in fault.values.items() if "@" in n]
-    parts = [f"comes late by {min(starts):z.2g} to {max(starts):z.2g} intervals"] if starts else []
+    ends = f"{min(starts):z.2g} to {max(starts):z.2g} intervals" if starts else ""
+    parts = [f"comes late by another amount in each recording, {ends}"] if starts else []
     parts += [
         f"has a clock that is {'slow' if v > 0.0 else 'fast'} by {1e6 * abs(v):.3g} ppm"
         for n, v in fault.values.items() if "@" not in n
     ]  # fmt: skip
     whose = LOGGERS.get(fault.channel, fault.whose)
-    return Told(f"the {whose} {' and '.join(parts)}{', another one in each recording' * bool(starts)}", "clock")
+    return Told(f"the {whose} {', and '.join(parts)}", "clock")
 
 
 KINDS: dict[str, Callable[[Fault], Told]] = {
