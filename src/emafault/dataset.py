@@ -167,14 +167,14 @@ def simulate_and_measure(
     recording : name of the recording that is replayed, if any
     """
     from .actuator.commands import seen_by_controller
-    from .actuator.parameters import with_shape
+    from .actuator.parameters import with_coefficients
     from .actuator.sensors import SensorNoise, measure
     from .actuator.simulate import commanded_position, simulate
     from .actuator.unlisted import in_machine
 
     unlisted, seed = spec.get("unlisted", ()), spec["seed"]
     terms = in_machine(unlisted, len(runs), seed, first_run, recording)
-    runs = with_shape(runs, unlisted, recording)
+    runs = with_coefficients(runs, unlisted, recording)
     period = float(runs["control_period"][0])
     seen = seen_by_controller(command, unlisted, period, float(runs["position_gain"][0]))
     signals = simulate(runs, seen, duration, interval, terms=terms)

@@ -5,7 +5,7 @@ import pytest
 
 from emafault.actuator.commands import command_positions, seen_by_controller
 from emafault.actuator.fixed_step import simulate_fixed_step
-from emafault.actuator.parameters import make_runs, with_shape
+from emafault.actuator.parameters import make_runs, with_coefficients
 from emafault.actuator.simulate import simulate
 from emafault.actuator.unlisted import COORDINATES, PLACES, SHAPES, acting, remembered, term
 from emafault.config import reference_actuator
@@ -182,12 +182,23 @@ def test_both_simulations_agree(nominal, place, shape, parameters):
 @pytest.mark.parametrize("form", [(), ("back_emf_shape",)], ids=["closed", "tabulated"])
 def test_both_simulations_agree_on_a_back_emf_with_harmonics(nominal, form):
     runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
-    shaped = with_shape(runs, [{"place": "emf", "form": "harmonics", "h3": 0.3, "h11": -0.1}])
+    shaped = with_coefficients(runs, [{"place": "emf", "form": "harmonics", "h3": 0.3, "h11": -0.1}])
     assert not runs["emf_harmonics"].any()
     ours = stretches(simulate(shaped, TO_AND_FRO, 0.3, 2e-4))
     theirs = stretches(simulate_fixed_step(shaped, TO_AND_FRO, 0.3, 2e-4, 2e-6, forms=form))
 
     assert apart(ours, theirs, nominal) < (1e-2 if form else 4e-3) < 0.3 * apart(ours, nominal, nominal)
+
+
+def test_both_simulations_agree_on_windings_that_differ(nominal):
+    runs = make_runs(ACTUATOR, np.zeros((1, 6)), theta_0=0.7)
+    shares = {"inductance_b": -0.3, "back_emf_b": 0.1, "back_emf_c": -0.1}
+    unequal = with_coefficients(runs, [{"place": "winding", "form": "coefficient", **shares}])
+    assert not runs["back_emf_share"].any()
+    ours = stretches(simulate(unequal, TO_AND_FRO, 0.3, 2e-4))
+    theirs = stretches(simulate_fixed_step(unequal, TO_AND_FRO, 0.3, 2e-4, 2e-6))
+
+    assert apart(ours, theirs, nominal) < 4e-3 < 0.3 * apart(ours, nominal, nominal)
 
 
 TOGETHER = np.array(

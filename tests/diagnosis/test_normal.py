@@ -131,11 +131,11 @@ def test_what_is_approached_in_steps_has_the_others_fitted_beside_it_and_the_ste
 
 def test_a_step_is_shortened_to_the_lowest_point_of_the_parabola():
     """Of a misfit with the slope -2 promised and the value at the whole step, here 10 (1 - 3 s)^2 / 9, least at 1/3."""
-    began = Began({"a": 0.0}, (10.0 / 9.0, None), promised=10.0 / 3.0)
+    began = Began({"a": 0.0}, (10.0 / 9.0, None), promised=10.0 / 3.0, instead={})
     assert began.rise((40.0 / 9.0, None)) == pytest.approx(30.0 / 9.0)
     assert began.shorter(1.0, 30.0 / 9.0) == pytest.approx(1.0 / 3.0)
     assert began.shorter(0.5, 1e9) == pytest.approx(0.05) and began.shorter(0.5, 0.0) == pytest.approx(0.25)
-    assert Began({}, (0.0, None), promised=np.inf).shorter(0.2, 1.0) == pytest.approx(0.1)
+    assert Began({}, (0.0, None), promised=np.inf, instead={}).shorter(0.2, 1.0) == pytest.approx(0.1)
     assert between({"a": 1.0}, {"a": 3.0}, 0.25) == {"a": 1.5}
 
 

@@ -223,6 +223,11 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"emf.h3": -0.02, "emf.h11": 0.004},
             {"place": "emf", "form": "harmonics", "h3": -0.02, "h11": 0.004},
         ),
+        (
+            "~coefficient_winding",
+            {"winding.back_emf_b": 0.01, "winding.inductance_c": -0.03},
+            {"place": "winding", "form": "coefficient", "back_emf_b": 0.01, "inductance_c": -0.03},
+        ),
         ("~clock_angle", {"clock_rate.angle": 2e-4}, {"place": "angle", "form": "clock", "rate": 2e-4}),
         (
             "~clock_motion",

@@ -161,6 +161,17 @@ def test_white_with_a_back_emf_that_has_harmonics(command):
         assert 0.75 < after[equation] < 1.2 and before[equation] > 1.3, equation
 
 
+def test_white_with_a_winding_that_differs():
+    entry = {"place": "winding", "form": "coefficient", "back_emf_b": 0.03, "inductance_b": -0.3}
+    recording = recorded("reversal", unlisted=(entry,), fault=FAULT, health="seeded")
+    machine = machine_of({"a.nc": recording})
+    without = truth(machine, recording, fault=FAULT)
+    of = {"winding.back_emf_b": 0.03, "winding.inductance_b": -0.3}
+    none, back_emf, both = (mean_squares(machine, without | {n: of[n] for n in list(of)[:count]}) for count in range(3))
+    assert both["electrical_b"] < 1.2 < 1.1 * back_emf["electrical_b"] < none["electrical_b"]
+    assert both["torque"] < 1.2 < none["torque"]
+
+
 def test_the_controller_sees_the_speed_as_its_sensor_makes_it():
     recording = recorded("reversal", effects={"speed_latency": {"tau": 2e-3}})
     machine = machine_of({"a.nc": recording})

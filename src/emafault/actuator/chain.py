@@ -13,7 +13,7 @@ import numpy as np
 from ..first_order import filtered, smoothed
 from ..resampled import before
 from ..switches import direction
-from .grammar import CONTROLLER, FACTORS, LOGGERS, MACHINE, PHASES, SHAPE, SHAPES, of_recording
+from .grammar import CONTROLLER, FACTORS, IN_RUN, LOGGERS, MACHINE, PHASES, SHAPES, of_recording
 from .motor import AXIS, trapezoid
 from .unlisted import PLACES, drawn_phase, followed, row_of
 
@@ -53,7 +53,7 @@ class Chain:
         number: int,
         recording: str,
     ):
-        mine = [of_recording(e, recording) for e in entries if e["place"] not in MACHINE | SHAPE | CONTROLLER]
+        mine = [of_recording(e, recording) for e in entries if e["place"] not in MACHINE | IN_RUN | CONTROLLER]
         self.entries = sorted(mine, key=lambda e: ORDER.index("" if e["form"] in SHAPES else e["form"]))
         self.run, self.interval, self.seed, self.number = run, interval, seed, number
 

@@ -139,6 +139,7 @@ def constants(record, forms):
     for j in range(3):
         R20[j] = record.resistance * (1.0 - N[j]) * (1.0 if forms[F_UNIT] else record.unit_calibration_R_scale)
         L[j] = record.inductance * (1.0 - N[j]) ** 2 * record.inductance_tolerance_L_scale
+        L[j] *= 1.0 + record.inductance_share[j]
         if forms[F_L]:
             L[j] *= 1.0 + 0.02 * np.cos(ALPHA[j])
         if forms[F_CONTACT]:
@@ -146,6 +147,7 @@ def constants(record, forms):
         if forms[F_UNIT]:  # the excess is a lead common in kind: neither shorted nor heated
             Rx[j] += record.resistance * (record.unit_calibration_R_scale - 1.0)
         k0[j] = record.back_emf * record.unit_calibration_k_scale * (1.0 - N[j]) * (1.0 + magnet)
+        k0[j] *= 1.0 + record.back_emf_share[j]
         if record.eccentricity_law == 0:
             k0[j] *= 1.0 + record.eccentricity[0] * np.cos(ALPHA[j]) + record.eccentricity[1] * np.sin(ALPHA[j])
     return R20, Rx, L, k0

@@ -17,8 +17,9 @@ MACHINE = {
     "torque": "N m", **{f"emf_{j}": "1" for j in PHASES}, **{f"resistance_{j}": "ohm" for j in PHASES}, "drag": "N m",
     "torque_constant": "1", "inertia": "1", "back_emf": "1", "resistance": "ohm",
 }  # fmt: skip
-#: the shape of the back-EMF of all phases, each along its own electrical angle -> unit of what a form adds to it
-SHAPE = {"emf": "1"}
+#: what stands in the record of a run: the shape of the back-EMF of all phases, each along its own electrical angle, and
+#: the windings of single phases -> unit of what a form adds to it
+IN_RUN = {"emf": "1", "winding": "1"}
 #: several channels that another logger may record, with a clock that is not that of the rest
 LOGGERS = {"positions": ("angle", "output"), "motion": ("angle", "output", "speed")}
 #: channel of the measuring chain -> its unit; without a phase, that of all three
@@ -35,7 +36,7 @@ FACTORS = {
 }  # fmt: skip
 #: what a controller may do with its command before it compares it -> unit
 CONTROLLER = {"command": "1"}
-PLACES = MACHINE | SHAPE | CHANNELS | FACTORS | CONTROLLER
+PLACES = MACHINE | IN_RUN | CHANNELS | FACTORS | CONTROLLER
 #: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
 #: of the magnitudes), the angle turned since the start over the gear ratio, time, the initial winding temperature
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
@@ -80,12 +81,14 @@ OF_CONTROLLER = {"command_filter": ("time_constant",), "feedforward": ("gain",)}
 #: is all that a shape has whose halves mirror one another
 ORDERS = (3, 5, 7, 9, 11, 13)
 OF_SHAPE = {"harmonics": tuple(f"h{n}" for n in ORDERS)}
-FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER | OF_SHAPE
+#: shares by which phases' back-EMF coefficients and inductances differ from what their turns make of those of all
+OF_WINDING = {"coefficient": tuple(f"{name}_{j}" for name in ("back_emf", "inductance") for j in PHASES)}
+FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER | OF_SHAPE | OF_WINDING
 #: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing, a
-#: gain that stays, a harmonic that is not there, what a clock does not do
+#: gain that stays, a harmonic that is not there, a coefficient that does not differ, what a clock does not do
 OPTIONAL = {
     "frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",), "harmonics": OF_SHAPE["harmonics"],
-    "clock": OF_CHANNELS["clock"],
+    "coefficient": OF_WINDING["coefficient"], "clock": OF_CHANNELS["clock"],
 }  # fmt: skip
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
 EACH = "recordings"
@@ -95,8 +98,8 @@ def forms_at(place: str) -> list[str]:
     """Forms that a place may have."""
     if place in CONTROLLER:
         return list(OF_CONTROLLER)
-    if place in SHAPE:
-        return list(OF_SHAPE)
+    if place in IN_RUN:
+        return list(OF_SHAPE if place == "emf" else OF_WINDING)
     if place in LOGGERS:
         return ["clock"]
     shapes = [form for form in SHAPES if form != "travel" or place == "torque"]

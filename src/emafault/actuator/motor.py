@@ -39,8 +39,8 @@ def phase_constants(p, R_winding, L, k):
     for j in range(3):
         turns = 1.0 - p.shorted_turns[j]
         R_winding[j] = p.resistance * p.unit_calibration_R_scale * turns
-        L[j] = p.inductance * p.inductance_tolerance_L_scale * turns * turns
-        k[j] = p.back_emf * p.unit_calibration_k_scale * turns * magnet
+        L[j] = p.inductance * p.inductance_tolerance_L_scale * turns * turns * (1.0 + p.inductance_share[j])
+        k[j] = p.back_emf * p.unit_calibration_k_scale * turns * magnet * (1.0 + p.back_emf_share[j])
         if p.eccentricity_law == 0:
             k[j] *= 1.0 + p.eccentricity[0] * np.cos(AXIS[j]) + p.eccentricity[1] * np.sin(AXIS[j])
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..errors import InputError
 from ..nominal import ActuatorParameters
-from .grammar import OF_SHAPE, ORDERS, SHAPE, of_recording
+from .grammar import OF_SHAPE, OF_WINDING, ORDERS, PHASES, of_recording
 
 ECCENTRICITY_LAWS = ("stator_fixed", "rotor_angle", "rotor_angle_per_phase")
 
@@ -27,6 +27,8 @@ _CONDITIONS = (
     ("eccentricity_law", np.int64),
     ("theta_0", np.float64),  # rotor angle at the start, rad
     ("emf_harmonics", np.float64, (len(ORDERS),)),  # of the back-EMF's shape, by order, beside those of an effect
+    ("back_emf_share", np.float64, (3,)),  # by which a phase's coefficient differs from what its turns make of all's
+    ("inductance_share", np.float64, (3,)),
 )
 
 RUN_DTYPE = np.dtype(
@@ -105,12 +107,14 @@ def set_effects(runs: np.ndarray, effects: Mapping[str, Mapping[str, Any]]) -> N
             runs[effect.field(name)] = value
 
 
-def with_shape(runs: np.ndarray, entries: Sequence[Mapping[str, Any]], recording: str = "") -> np.ndarray:
-    """(run,) records whose back-EMF has the harmonics of the entries of ``unlisted`` that are of its shape; of a
-    recording that is replayed, by its name."""
-    mine = [of_recording(e, recording) for e in entries if e["place"] in SHAPE]
-    if not mine:
-        return runs
+def with_coefficients(runs: np.ndarray, entries: Sequence[Mapping[str, Any]], recording: str = "") -> np.ndarray:
+    """(run,) records with the harmonics of the back-EMF's shape and the coefficients of single phases that entries of
+    ``unlisted`` have; of a recording that is replayed, by its name."""
     out = runs.copy()
-    out["emf_harmonics"] += [sum(e.get(name, 0.0) for e in mine) for name in OF_SHAPE["harmonics"]]
+    for e in (of_recording(e, recording) for e in entries):
+        if e["form"] in OF_SHAPE:
+            out["emf_harmonics"] += [e.get(name, 0.0) for name in OF_SHAPE[e["form"]]]
+        for full in OF_WINDING.get(e["form"], ()):
+            name, _, phase = full.rpartition("_")
+            out[f"{name}_share"][:, PHASES.index(phase)] += e.get(full, 0.0)
     return out

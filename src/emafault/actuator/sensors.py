@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .grammar import MACHINE
+from .grammar import IN_RUN, MACHINE
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def measure(
     the signals with noise, and ``ambient_temperature`` (run,) in degC
     """
     out = {name: np.array(values, copy=True) for name, values in signals.items()}
-    changed = any(entry["place"] not in MACHINE for entry in unlisted)
+    changed = any(entry["place"] not in MACHINE | IN_RUN for entry in unlisted)
     if changed:
         from .chain import Chain
     out["ambient_temperature"] = runs["reference_temperature"] + runs["dT"]

@@ -14,7 +14,7 @@ TOLERANCES = 4.0  # within which a unit's own values lie: its parameters' prior 
 #: kinds of described forms, over which their prior is spread evenly
 WORDS = (
     "lag", "clock", "crosstalk", "drift", "sensor_curve", "order", "frequency", "bump", "step_change", "pulse",
-    "function", "power", "memory", "travel", "harmonics",
+    "function", "power", "memory", "travel", "harmonics", "coefficient",
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from .forked import Workers
 from .linear import OWN_FORM, OWN_SHARES, OwnForm, White, assemble, full_model, function_of, white_rows
 from .linearisation import Carried, Linearisation, Task
 from .model import SETTINGS, Parameter, Unit, Variant
-from .point import Point, is_parameter
+from .point import Point, in_values, is_parameter
 from .sets import FORM_WIDTHS, OTHER_FORM, REMAINDER_SIZES, WIDTHS, Candidate, Model
 
 
@@ -33,6 +33,7 @@ class NormalEquations(Point):
         self.carried: dict[str, Carried] = {}
         self.workers: Workers | None = None
         self.remainders: dict[str, Unit] = {}
+        self.instead: dict[str, float] = {}  # the point, had the last step added to factors and not multiplied them
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
 
     def linearise(
@@ -334,10 +335,10 @@ class NormalEquations(Point):
                 else:
                     moved[p.name] = d
             on.add(unit.id)
-        found = self.after(moved)
-        for unit in self.units:  # of another variant of a unit that acts the step has taken out what the point held
-            found |= {p.name: p.off for p in unit.parameters if unit.id not in inside or p.name not in moved}
-        self.point |= found
+        # of another variant of a unit that acts the step has taken out what the point held
+        out = {p.name: p.off for u in self.units for p in u.parameters if u.id not in inside or p.name not in moved}
+        self.instead = self.point | self.after(moved, in_values) | out
+        self.point |= self.after(moved) | out
         for unit, p, d in switched:
             self._switch_on(unit, p, d)
         self.on = on

@@ -17,6 +17,15 @@ def is_parameter(column: str) -> bool:
     return not column.startswith(("remainder.", "own."))
 
 
+def _in_logarithms(step: float) -> float:
+    return float(np.exp(np.clip(step, -1.0, 1.0)))
+
+
+def in_values(step: float) -> float:
+    """Factor of a quantity that an equation is linear in after a relative step, which keeps its sign."""
+    return 1.0 + step if step > -0.5 else -0.25 / step
+
+
 @dataclass(frozen=True)
 class Place:
     """Where a point was, and which units acted there."""
@@ -120,8 +129,8 @@ class Point:
             return base + beyond, base
         return base + beyond, (base + beyond) / base
 
-    def after(self, given: Mapping[str, float]) -> dict[str, float]:
-        """Values of parameters after deviations from the point."""
+    def after(self, given: Mapping[str, float], share_of=_in_logarithms) -> dict[str, float]:
+        """Values of parameters after deviations from the point; ``share_of`` : factor that a deviation makes of one."""
         out: dict[str, float] = {}
         for n, d in given.items():
             if not is_parameter(n):
@@ -131,11 +140,11 @@ class Point:
                 out[n] = self.point.get(n, p.off) + d
             elif p.alias is None:
                 u, factor = self._factor(n)
-                out[n] = p.vanishes + factor * float(np.exp(np.clip(d / u, -1.0, 1.0)))
+                out[n] = p.vanishes + factor * share_of(d / u)
             else:
                 u, factor = self._factor(n)
                 own = out.get(p.alias, p.vanishes + u / factor)
-                out[n] = (own - p.vanishes) * (factor * float(np.exp(np.clip(d / u, -1.0, 1.0))) - 1.0)
+                out[n] = (own - p.vanishes) * (factor * share_of(d / u) - 1.0)
         return out
 
     def _deviation_to(self, name: str, value: float) -> float:

@@ -21,11 +21,12 @@ FAR = 1e3  # log evidence that a step promises, beyond which its own bias does n
 @dataclass(frozen=True)
 class Began:
     """Where a step began: the point, its misfit (nats) with the noise's part and, where that is known, without, and the
-    log evidence that the step promised."""
+    log evidence that the step promised; and where it ends if factors are added to, not multiplied."""
 
     point: dict[str, float]
     misfits: tuple[float, float | None]
     promised: float
+    instead: dict[str, float]
 
     def rise(self, after: tuple[float, float | None]) -> float:
         """By how much the misfit is larger after the step."""
@@ -87,7 +88,7 @@ class Settling(NormalEquations):
             at, misfits = dict(self.point), self._misfits(normal, model, True)
             ahead = to_come = self.move(model, normal)
             if begun.on <= set(model.units):  # else the step takes something out, by which a set may fit worse
-                began = Began(at, misfits, ahead)
+                began = Began(at, misfits, ahead, self.instead)
             if ahead < self.settled:
                 return model
             new = {u.id for u in self.units if u.on is not None and len(u.variants) > 1 and u.id in self.on - begun.on}
@@ -104,7 +105,7 @@ class Settling(NormalEquations):
                     to_come = 0.0
                     break
                 before, ahead = ahead, self.move(found, at_point)
-                began = Began(at, misfits, ahead) if keeps else None
+                began = Began(at, misfits, ahead, self.instead) if keeps else None
                 # steps shrink on at least as they did
                 to_come = min(ahead, ahead * ahead / before) if 0.0 < before < np.inf else ahead
             left, to_come = to_come, np.inf
@@ -126,13 +127,26 @@ class Settling(NormalEquations):
     ) -> tuple[Model, Normal, tuple[float, float | None]]:
         """A set fitted at the present point, or nearer to where the last step began if it fits worse than there, in the
         end at that point once a shorter step promises nothing (backtracking; Nocedal and Wright 2006, section 3.1); and
-        its misfits where the point then lies."""
+        its misfits where the point then lies.
+
+        In logarithms of factors a product is linear, in the factors themselves a sum: what fits worse after a step of
+        the former may fit better after one of the latter.
+        """
         share, whole = 1.0, dict(self.point)
+        ends = [] if began is None else [began.instead]
+        rises: list[tuple[float, dict[str, float]]] = []
         while True:
             found, at_point = self._fitted(model, corrected)
             misfits = self._misfits(at_point, found, corrected)
             if began is None or share == 0.0 or (rise := began.rise(misfits)) < self.settled:
                 return found, at_point, misfits
+            if share == 1.0:
+                rises.append((rise, whole))
+                if ends:
+                    whole = ends.pop()
+                    self.point = dict(whole)
+                    continue
+                rise, whole = min(rises, key=lambda r: r[0])
             share = began.shorter(share, rise)
             if 2.0 * share * min(began.promised, FAR) < self.settled:
                 share = 0.0

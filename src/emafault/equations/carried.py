@@ -117,7 +117,7 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
     if kind == "drop":
         ((place, drop),) = ((n, v) for n, v in values.items() if n != "turn")
         return _rounded({"place": place, "form": "drop", "drop": drop, "turn": values["turn"]})
-    if kind == "harmonics":
+    if kind in ("harmonics", "coefficient"):
         return _rounded({"place": channel, "form": kind, **values})
     if kind == "controller":
         ((_, amount),) = values.items()

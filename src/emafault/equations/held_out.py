@@ -117,12 +117,27 @@ def held_to_account(
 
 def misfits(found: HeldOut) -> dict[str, float]:
     """Log odds by equation that the confirm recordings have other values than those of the leading set: see
-    ``predictive``."""
+    ``predictive``.
+
+    What an equation lacks draws what it shares with others to where those are missed too: one after the other, the
+    equation that is missed most has a remainder when the others are asked.
+    """
     explored, model = found.explored, found.leading
-    inserted = explored.bench.inserted(model, explored.fit.normal)
-    also = [n for n in model.deviations if is_parameter(n)]
-    confirm = explored.ladder.blocks(inserted.values, also=also, inserted=inserted)
-    return predictive.log_odds(explored.bench, explored.fit, model, confirm)
+    out: dict[str, float] = {}
+    given: list[str] = []  # equations that have a remainder by then
+    while True:
+        inserted = explored.bench.inserted(model, explored.fit.normal)
+        also = [n for n in model.deviations if is_parameter(n)]
+        confirm = explored.ladder.blocks(inserted.values, also=also, inserted=inserted)
+        odds = predictive.log_odds(explored.bench, explored.fit, model, confirm)
+        out |= {e: o for e, o in odds.items() if e not in given}
+        remainders = {e: (f"remainder:{e}", 0) for e, o in out.items() if o > 0.0}
+        missed = [e for e, r in remainders.items() if r in explored.fit.search.candidates and r[0] not in model.units]
+        if not missed:
+            return out
+        given.append(max(missed, key=lambda e: out[e]))
+        members = [(c.unit, c.variant) for c in model.choices]
+        model = explored.fit.search.fit((*members, remainders[given[-1]]))
 
 
 def _ask_remainders(sets: "_Sets", account: "_Account", ratios: dict[str, float]) -> None:

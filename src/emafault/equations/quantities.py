@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..actuator.shape import trapezoid_at, trapezoid_swept
-from . import waveform
+from . import waveform, windings
 from .acquisition import currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
@@ -147,7 +147,8 @@ def _coefficients(state: State) -> None:
         turns = _turns(state, "N" + "abc"[j])
         g = 1.0 + x * np.cos(rec.axis[j]) + y * np.sin(rec.axis[j])
         state.turns.append(turns)
-        state.k.append(_product(state, "coefficient", rec, j) * turns * g * a.back_emf)
+        own = windings.factor(state.p, "back_emf", j)
+        state.k.append(_product(state, "coefficient", rec, j) * own * turns * g * a.back_emf)
 
 
 def _turns(state: State, fault: str) -> Dual:

@@ -24,6 +24,7 @@ CONTROLLER = {
     "filter": "the command passes a first-order filter with a time constant of {:.2g} s",
     "feedforward": "{:.2g} of the command's speed is fed forward to the demanded speed",
 }
+WINDING = {"back_emf": "back-EMF coefficient", "inductance": "inductance"}
 CHAIN = "In the measuring chain"
 
 
@@ -127,6 +128,16 @@ def _harmonics(fault: Fault) -> Told:
     return Told(says, "coefficient", "rotor_angle", "In the electrical equation")
 
 
+def _coefficient(fault: Fault) -> Told:
+    parts = []
+    for full, share in fault.values.items():
+        name, _, phase = full.partition(".")[2].rpartition("_")
+        size = f"{100.0 * abs(share):.2g} % too {'high' if share > 0.0 else 'low'}"
+        parts.append(f"the {WINDING[name]} of phase {phase} is {size}")
+    says = f"{', '.join(parts)} for its turns and the coefficients of all phases"
+    return Told(says, "coefficient", "current", "In the electrical equation")
+
+
 def _ambient(fault: Fault) -> Told:
     above = fault.values.values()
     ends = f"{min(above):z.2g} to {max(above):z.2g} K above the recorded ambient temperature"
@@ -200,5 +211,6 @@ def _clock(fault: Fault) -> Told:
 KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "clock": _clock, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift,
     "gain": _gain, "scale": _scale, "harmonics": _harmonics,
+    "coefficient": _coefficient,
     "ambient": _ambient, "controller": _controller,
 }  # fmt: skip

@@ -4,7 +4,7 @@ from ..diagnosis.described import Described
 from .acquisition import GAIN_NAMES, RATE
 from .point import SEEDED
 from .telling import bare
-from .telling_chain import CHANNELS, LATE, channel_in_words, of_phase
+from .telling_chain import CHANNELS, LATE, WINDING, channel_in_words, of_phase
 
 FAULTS = {
     "Na": "shorted turns of phase a, share of all", "Nb": "shorted turns of phase b, share of all",
@@ -108,6 +108,8 @@ def _of_group(group: str, short: str) -> str:
         return {"filter": "filter of the command", "feedforward": "feed-forward of the command's speed"}[short]
     if group == "emf":
         return f"harmonic of the back-EMF of order {short.removeprefix('h')}"
+    if group == "winding":
+        return f"{WINDING[short.rpartition('_')[0]]} of phase {short[-1]}, beside those of all phases"
     channel, _, side = short.partition("_")
     late = short.rpartition("_")[0]
     chain = {

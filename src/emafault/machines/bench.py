@@ -98,7 +98,8 @@ class MeasuredBench(Bench):
         """See ``Bench``; the point stays where parameters are possible."""
         ahead = super().move(model, normal)
         for n, (low, high) in self.machine.bounds.items():
-            self.point[n] = float(np.clip(self.point[n], low, high))
+            for point in (self.point, self.instead):
+                point[n] = float(np.clip(point[n], low, high))
         return ahead
 
     def _ends(self, model, names):
