@@ -261,3 +261,24 @@ def test_an_own_form_goes_with_no_prior_that_its_unit_is_too_large_for(size, wid
     _, candidates = bench.candidates(reduced)
     assert candidates["b", 0].widths == WIDTHS
     assert {c.widths for (_, v), c in candidates.items() if v >= OTHER_FORM} == {widths}
+
+
+def test_a_step_of_a_factor_is_taken_in_its_value_where_that_fits_better():
+    """A torque is linear in its friction, however many times as large that is: in logarithms a step goes too far by as
+    much as the data tell it, and is shortened again and again."""
+
+    class Friction(Machine):
+        c = Parameter("c", 1.0, 1.0, 2.0, vanishes=0.0)
+        parameters = {"a": Parameter("a", 0.0, 0.0, 10.0), "c": c}  # noqa: RUF012
+        units = (Unit("c", "structural", ("torque",), [Variant([c])]),)
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other = np.random.default_rng(3).standard_normal((3, ROWS))
+            one, other = 1e3 * one, 1e3 * (one + 0.03 * other)
+            residual = noise + (values["a"] + 4.0) * one + (values["c"] - 7.0) * other
+            columns = {"a": one, "c": other}
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    bench = Bench(Friction(), ["r"])
+    bench.settle(Model((Choice("c", 0, 1.0),)))
+    assert bench.point["c"] == pytest.approx(7.0, abs=0.01) and bench.point["a"] == pytest.approx(-4.0, abs=0.01)

@@ -232,6 +232,27 @@ def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
     assert account.ratio("~frequency") == 400.0  # asked after all, it is there again
 
 
+def test_what_one_equation_lacks_is_no_misfit_of_those_that_share_its_nuisances(monkeypatch):
+    """A torque that lacks something draws the back-EMF constant along, which all phases then miss."""
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), 0.0, 0.0, {}, {})
+
+    remainders = [(f"remainder:{e}", 0) for e in ("torque", "electrical_a", "position")]
+    search = SimpleNamespace(fit=fit, candidates=remainders)
+    bench = SimpleNamespace(inserted=lambda model, normal: SimpleNamespace(values={}))
+    ladder = SimpleNamespace(blocks=lambda values, also, inserted: [])
+    explored = SimpleNamespace(bench=bench, ladder=ladder, fit=SimpleNamespace(search=search, normal=None))
+    of = {
+        ("inertia",): {"torque": 50.0, "electrical_a": 20.0, "position": 3.0},
+        ("inertia", "remainder:torque"): {"torque": -9.0, "electrical_a": -5.0, "position": 4.0},
+        ("inertia", "remainder:position", "remainder:torque"): {"torque": -8.0, "electrical_a": -5.0, "position": -1.0},
+    }
+    monkeypatch.setattr(held_out.predictive, "log_odds", lambda bench, fit, model, confirm: of[model.units])
+    found = held_out.HeldOut(explored, {}, {}, fit([("inertia", 0)]))
+    assert held_out.misfits(found) == {"torque": 50.0, "electrical_a": -5.0, "position": 4.0}
+
+
 @pytest.mark.parametrize(("own", "named"), [(-3.0, False), (9.0, True)])
 def test_beside_what_is_not_told_any_more_an_effect_is_compared_at_its_own_optimum(own, named):
     """The linear model's point is that of the set with all of it."""
