@@ -285,6 +285,9 @@ CHANNELS = {
         ),
         ("coefficient in electrical",),
     ),
+    "inductance of phase b 3 % low": Channel(
+        entry("winding", "coefficient", inductance_b=-0.03), ("coefficient in electrical",)
+    ),
     "three waves of a bearing": Channel(
         entries(*(
             ("torque", "order", {"order": 3.57 * k, "amplitude": 0.005 - 0.001 * k, "phase": k}) for k in (1, 2, 3)

@@ -244,13 +244,18 @@ def test_what_one_equation_lacks_is_no_misfit_of_those_that_share_its_nuisances(
     ladder = SimpleNamespace(blocks=lambda values, also, inserted: [])
     explored = SimpleNamespace(bench=bench, ladder=ladder, fit=SimpleNamespace(search=search, normal=None))
     of = {
-        ("inertia",): {"torque": 50.0, "electrical_a": 20.0, "position": 3.0},
-        ("inertia", "remainder:torque"): {"torque": -9.0, "electrical_a": -5.0, "position": 4.0},
-        ("inertia", "remainder:position", "remainder:torque"): {"torque": -8.0, "electrical_a": -5.0, "position": -1.0},
+        ("inertia",): {"torque": 50.0, "electrical_a": 20.0, "position": 3.0, "bus": -2.0},
+        ("inertia", "remainder:torque"): {"torque": -9.0, "electrical_a": -5.0, "position": 4.0, "bus": 90.0},
+        ("inertia", "remainder:position", "remainder:torque"): {
+            "torque": -8.0,
+            "electrical_a": -5.0,
+            "position": -1.0,
+            "bus": 0.5,
+        },
     }
     monkeypatch.setattr(held_out.predictive, "log_odds", lambda bench, fit, model, confirm: of[model.units])
     found = held_out.HeldOut(explored, {}, {}, fit([("inertia", 0)]))
-    assert held_out.misfits(found) == {"torque": 50.0, "electrical_a": -5.0, "position": 4.0}
+    assert held_out.misfits(found) == {"torque": 50.0, "electrical_a": -5.0, "position": 3.0, "bus": -2.0}
 
 
 @pytest.mark.parametrize(("own", "named"), [(-3.0, False), (9.0, True)])

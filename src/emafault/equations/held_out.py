@@ -120,7 +120,7 @@ def misfits(found: HeldOut) -> dict[str, float]:
     ``predictive``.
 
     What an equation lacks draws what it shares with others to where those are missed too: one after the other, the
-    equation that is missed most has a remainder when the others are asked.
+    equation that is missed most has a remainder when the others are asked, and those are missed that are by then too.
     """
     explored, model = found.explored, found.leading
     out: dict[str, float] = {}
@@ -130,7 +130,7 @@ def misfits(found: HeldOut) -> dict[str, float]:
         also = [n for n in model.deviations if is_parameter(n)]
         confirm = explored.ladder.blocks(inserted.values, also=also, inserted=inserted)
         odds = predictive.log_odds(explored.bench, explored.fit, model, confirm)
-        out |= {e: o for e, o in odds.items() if e not in given}
+        out |= {e: min(o, out.get(e, np.inf)) for e, o in odds.items() if e not in given}
         remainders = {e: (f"remainder:{e}", 0) for e, o in out.items() if o > 0.0}
         missed = [e for e, r in remainders.items() if r in explored.fit.search.candidates and r[0] not in model.units]
         if not missed:
