@@ -195,6 +195,11 @@ def with_hum_of_currents(r: Recording, n: int) -> Recording:
     return replace(r, phase_current=r.phase_current + wave, phase_current_end=r.phase_current_end + wave)
 
 
+def losing_counts(x: np.ndarray, n: int) -> np.ndarray:
+    """An angle whose encoder loses four of 4096 counts, at another time in each recording."""
+    return x + 4.0 * 2.0 * np.pi / 4096 * (np.arange(len(x)) > 1000 + 700 * n)
+
+
 def late_by_recording(x: np.ndarray, n: int) -> np.ndarray:
     """A signal that is up to an interval late, by another share in each recording."""
     return before(x, np.full(len(x), 0.5 + 0.5 * each(n)))
@@ -271,6 +276,7 @@ CHANNELS = {
     "speed's noise averaged over five samples": Channel(noisier(0.02, "speed"), change=with_averaged_noise),
     "angle new in one sample of five": changed(rotor_angle=lambda x, n: held(x, 5)),
     "hum of the currents": Channel(itself=("frequency in sensor_current",) * 3, change=with_hum_of_currents),
+    "angle that loses four counts of 4096": changed("step_change in sensor_angle", rotor_angle=losing_counts),
     "instants of the angle that scatter by 10 us": Channel(
         entry("angle", "clock", scatter=1e-5), ("clock in sensor_angle",)
     ),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from emafault.equations.quality import seen, told
+from emafault.io.sensors import calm_motion, slips
+from emafault.schema import check_unlisted
 
 from .conftest import in_steps, recorded
 
@@ -58,3 +60,57 @@ def test_steps_of_the_speed_are_told_where_the_library_has_no_effect_for_them():
     (entry,) = told({"a.nc": seen(coarse, ("cogging", "speed_quantisation"))})
     assert (entry["equation"], entry["form"]) == ("sensor_speed", "adc_step")
     assert entry["parameters"]["step"]["value"] == pytest.approx(0.5)
+
+
+COUNTS = 4 * 2.0 * np.pi / 4096
+
+
+def test_counts_that_an_angle_loses_are_told_and_added():
+    plain = recorded("reversal")
+    angle = plain.rotor_angle + COUNTS * (plain.time > 0.2) - COUNTS * (plain.time > 0.35)
+    lost = replace(plain, rotor_angle=angle)
+    channel = seen(lost)["rotor_angle"]
+    assert abs(channel.jump) == pytest.approx(COUNTS, abs=4e-4) and channel.spikes == 0.0
+    assert min(abs(channel.at - t) for t in (0.2, 0.35)) < 1.5 * plain.interval
+    (entry,) = told({"a.nc": {"rotor_angle": channel}, "b.nc": seen(plain)})
+    assert (entry["equation"], entry["form"], entry["recordings"]) == ("sensor_angle", "step_change", ["a.nc"])
+    assert entry["term"]["recordings"] == {"a.nc": {"jump": channel.jump, "time": channel.at}}
+    check_unlisted([entry["term"]])
+    np.testing.assert_allclose(calm_motion(lost).rotor_angle, calm_motion(plain).rotor_angle, atol=5e-4)
+
+
+def no_more(plain):
+    return plain
+
+
+def new_in_one_sample_of_five(plain):
+    return replace(plain, rotor_angle=plain.rotor_angle[np.arange(len(plain.time)) // 5 * 5])
+
+
+def standing_still(plain):
+    angle = plain.rotor_angle.copy()
+    angle[2000:2025] = angle[2000]
+    return replace(plain, rotor_angle=angle)
+
+
+def without_a_row(plain):
+    kept = np.delete(np.arange(len(plain.time)), 2000)
+    angle, speed = plain.rotor_angle[kept], plain.rotor_speed[kept]
+    return replace(plain, rotor_angle=angle, rotor_speed=speed, time=plain.time[:-1])
+
+
+def sampled_at_instants_that_scatter(plain):
+    late = 1e-5 * np.random.default_rng(1).standard_normal(len(plain.time))
+    return replace(plain, rotor_angle=plain.rotor_angle + late * plain.rotor_speed)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [no_more, new_in_one_sample_of_five, standing_still, without_a_row, sampled_at_instants_that_scatter],
+)
+def test_an_angle_that_goes_its_own_way_has_lost_no_counts(change):
+    assert len(slips(change(recorded("reversal")))[0]) == 0
+
+
+def test_a_filter_of_the_speed_loses_no_counts_of_the_angle():
+    assert len(slips(recorded("step", effects={"speed_latency": {"tau": 2e-3}}))[0]) == 0

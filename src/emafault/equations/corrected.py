@@ -11,7 +11,7 @@ import numpy as np
 from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.recording import Recording, write_recording
-from ..io.sensors import calm_motion, without_spikes
+from ..io.sensors import slips, without_slips, without_spikes, without_spikes_of_motion
 from ..resampled import before
 from ..switches import direction
 from .acquisition import CLOCKS, GAIN_NAMES, RATE, clock_names, drifting, full_range, rates, undone
@@ -31,8 +31,8 @@ def corrected(found: Diagnosed, recordings: Mapping[str, Recording]) -> tuple[di
     """The recordings less the faults of their measuring chain, and what has been undone.
 
     Lag, clock, curve, drop, drift, gain, crosstalk, waves and jumps of a channel as the diagnosis has them; spikes of
-    currents and motion are replaced by what their neighbours say. What cannot be undone (held samples, converter steps,
-    clipping) stays.
+    currents and motion are replaced by what their neighbours say, counts that the angle has lost are added. What cannot
+    be undone (held samples, converter steps, clipping) stays.
     """
     out, undone = {}, dict[str, None]()
     for name, recording in recordings.items():
@@ -49,6 +49,8 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
     values = found.values
     if "~spikes" in told:
         yield "spikes", _without_spikes
+    if "~step_change" in told:
+        yield "counts that the angle's encoder has lost", _with_all_counts
     for form in found.bench.described:
         of_voltage = form.equation.startswith("electrical_") and form.driver == 0 and form.word in OF_THE_CHANNEL
         channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
@@ -222,5 +224,11 @@ def _currents(recording: Recording, of: Callable[[np.ndarray], np.ndarray]) -> R
 
 
 def _without_spikes(recording: Recording) -> Recording:
-    calm = calm_motion(recording)
+    calm = without_spikes_of_motion(recording)
     return replace(calm, phase_current=without_spikes(recording.phase_current)[0])
+
+
+def _with_all_counts(recording: Recording) -> Recording:
+    return replace(
+        recording, rotor_angle=without_slips(recording.rotor_angle, *slips(without_spikes_of_motion(recording)))
+    )

@@ -1,4 +1,4 @@
-"""What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes."""
+"""What recordings show of their measuring chain without a model: clipping, steps, held samples, spikes, lost counts."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from ..actuator.grammar import EACH
 from ..io.currents_noise import adds_up, resting_noise
 from ..io.lattice import lattice_step
 from ..io.recording import Recording
-from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, spikes, without_outliers
+from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, slips, spikes, without_outliers, without_spikes_of_motion
 from ..io.updates import repeated, updates
 from .signals import MAY_BE_SLOWER
 
@@ -38,7 +39,8 @@ class Channel:
     inverter's ripple in the voltages; ``step``: of its
     converter, 0 where there is none to be seen; ``held``, ``spikes``, ``clipped``: shares of its samples; ``level``: at
     which it is cut off; ``every``: samples from one that is new to the next, of a channel slower than the recording;
-    ``scatter``: standard deviation of the instants at which it is sampled (s).
+    ``scatter``: standard deviation of the instants at which it is sampled (s); ``jump``: the largest by which an angle
+    has lost counts (rad), ``at`` when (s).
     """
 
     noise: float
@@ -49,6 +51,8 @@ class Channel:
     level: float = 0.0
     every: float = 0.0
     scatter: float = 0.0
+    jump: float = 0.0
+    at: float = 0.0
 
 
 def seen(recording: Recording, lacking: Collection[str] = (), scatter: float = 0.0) -> dict[str, Channel]:
@@ -76,10 +80,18 @@ def seen(recording: Recording, lacking: Collection[str] = (), scatter: float = 0
         if channel == "phase_current" and adds_up(recording) and np.isfinite(noise := resting_noise([recording])):
             out[channel] = replace(out[channel], noise=noise)
         if channel == "rotor_angle":
-            out[channel] = replace(out[channel], scatter=scatter)
+            jump, at = _largest_slip(recording)
+            out[channel] = replace(out[channel], scatter=scatter, jump=jump, at=at)
         if channel in BY_STEPS and BY_STEPS[channel] not in lacking:
             out[channel] = replace(out[channel], step=0.0, held=0.0)
     return out
+
+
+def _largest_slip(recording: Recording) -> tuple[float, float]:
+    """Size (rad) and time (s) of the largest jump by which the angle has lost counts, both 0 where there is none."""
+    rows, sizes = slips(without_spikes_of_motion(recording))
+    k = int(np.argmax(np.abs(sizes))) if len(sizes) else -1
+    return (float(sizes[k]), float(recording.time[rows[k]])) if len(sizes) else (0.0, 0.0)
 
 
 def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
@@ -99,7 +111,7 @@ def _channel(values: np.ndarray, lost: np.ndarray, summed: bool) -> Channel:
 
 
 def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
-    """Clipping, steps, held samples, spikes and scattered instants as entries of ``discovered``.
+    """Clipping, steps, held samples, spikes, scattered instants and lost counts as entries of ``discovered``.
 
     Parameters
     ----------
@@ -121,6 +133,8 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
              "the {0} channel has spikes in {3:.2g} % of its samples"),
             ("clock", {n: c.scatter for n, c in mine.items()}, "scatter", "s",
              "the {0} channel is sampled at instants that scatter by {1:.2g} s"),
+            ("step_change", {n: c.jump for n, c in mine.items()}, "jump", units,
+             "the {0} channel jumps by {1:.3g} {2} and stays there, as that of an encoder that loses counts"),
         ):  # fmt: skip
             found = {n: x for n, x in found.items() if x}
             if found:
@@ -130,6 +144,9 @@ def told(quality: Mapping[str, Mapping[str, Channel]]) -> list[dict[str, Any]]:
                 term = None if form == "spikes" else {"place": place, "form": form, parameter: float(f"{value:.8g}")}
                 if parameter == "every" and term is not None:
                     term = {"place": place, "form": "hold", "every": max(2, round(value))}
+                if form == "step_change" and term is not None:
+                    own = {n: {"jump": mine[n].jump, "time": mine[n].at} for n in found}
+                    term |= {"jump": 0.0, "time": 0.0, EACH: own}
                 out.append(entry | {"term": term})
     return out
 
@@ -183,6 +200,7 @@ def _cell(found: Mapping[str, float] | None, channel: str, most: float) -> dict[
             ("clipped", True, "{0:.2g} % clipped"), ("held", True, "{0:.2g} % held"),
             ("spikes", True, "{0:.2g} % spikes"), ("step", False, "steps of {0:.2g} {1}"),
             ("every", False, "one sample in {0:.2g} is new"), ("scatter", False, "instants scatter by {0:.2g} s"),
+            ("jump", False, "jumps by {0:.2g} {1}"),
         )
         if k in found
     ]  # fmt: skip

@@ -5,12 +5,13 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
 
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .command import refuse_unfollowed
-from .lattice import lattice_step
+from .lattice import lattice_step, spacing
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
@@ -27,6 +28,8 @@ CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise 
 CLIPPED_SPEED = 8  # samples of the speed, which lies on a lattice, at an extreme that the angle goes beyond
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
 MOTION = ("rotor_angle", "rotor_speed", "output_position")
+AROUND, NEAR = 9, 4  # samples on either side of one in which the angle may have lost counts, and those nearest
+LEAST = 3.0  # standard deviations from what rows that are missing would make of it
 SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
 FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
@@ -98,10 +101,56 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
 
 
 def calm_motion(recording: Recording) -> Recording:
-    """A recording whose signals of the motion have no spikes, and straight lines between the new samples of a channel
-    that is slower than the recording."""
+    """A recording whose signals of the motion have no spikes, whose angle has lost no counts, and with straight lines
+    between the new samples of a channel that is slower than the recording."""
+    calm = without_spikes_of_motion(recording)
+    return replace(calm, rotor_angle=without_slips(calm.rotor_angle, *slips(calm)))
+
+
+def without_spikes_of_motion(recording: Recording) -> Recording:
+    """The same with the angle as it is but for spikes."""
     angle, speed, output = (_calm(getattr(recording, n)) for n in MOTION)
     return replace(recording, rotor_angle=angle, rotor_speed=speed, output_position=output)
+
+
+def without_slips(angle: np.ndarray, rows: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """An angle (sample,) less what it is off by from some samples on."""
+    out = angle.copy()
+    for row, size in zip(rows, sizes, strict=True):
+        out[row:] -= size
+    return out
+
+
+def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Samples from which on the angle is off by more than before, as an encoder's that has lost counts, and by how much
+    (rad); (slip,) each, of a recording without spikes.
+
+    In that interval its change less the integrated speed stands out of those around it by more than these differ, and
+    by more than any lag of either would make of how the speed changes there; and it stays. An angle that repeated the
+    sample before makes up for what it missed, and one that has turned as far as in whole intervals lacks these.
+    """
+    angle, speed, h = recording.rotor_angle, recording.rotor_speed[1:], recording.interval
+    beside = 2 * AROUND + 1
+    if len(angle) < 2 * beside or recording.known.get("rotor_angle", {}).get("source"):
+        return np.zeros(0, int), np.zeros(0)
+    beyond = np.diff(angle) - h * speed
+    off = np.abs(beyond - median_filter(beyond, beside, mode="nearest"))
+    scale = np.maximum(median_filter(off, beside, mode="nearest"), np.median(off)) / 0.6745
+    changes = h * (maximum_filter1d(speed, beside) - minimum_filter1d(speed, beside))
+    found = off > np.maximum(SPIKE * np.maximum(scale, spacing(angle) / np.sqrt(6.0)), changes)
+    rows, sizes = [], []
+    for at in np.flatnonzero(found[AROUND:-AROUND]):
+        around = beyond[at : at + beside]
+        level = np.cumsum(around - (around.sum() - around[AROUND]) / (beside - 1))
+        size = level[AROUND : AROUND + NEAR].mean() - level[AROUND - NEAR : AROUND].mean()
+        row = int(at) + AROUND + 1
+        repeats, stays = angle[row - 1] == angle[row - 2], abs(size - around[AROUND]) < 0.5 * abs(size)
+        motion = (around.sum() - around[AROUND]) / (beside - 1) + h * float(np.median(speed[at : at + beside]))
+        missing = max(1.0, np.round(size / motion)) * motion if motion else 0.0
+        if stays and not repeats and abs(size - missing) > LEAST * scale[row - 1]:
+            rows.append(row)
+            sizes.append(float(size))
+    return np.array(rows, int), np.array(sizes)
 
 
 def _calm(x: np.ndarray) -> np.ndarray:
