@@ -96,7 +96,8 @@ def standing_still(plain):
 def without_a_row(plain):
     kept = np.delete(np.arange(len(plain.time)), 2000)
     angle, speed = plain.rotor_angle[kept], plain.rotor_speed[kept]
-    return replace(plain, rotor_angle=angle, rotor_speed=speed, time=plain.time[:-1])
+    command = plain.commanded_position[kept]
+    return replace(plain, rotor_angle=angle, rotor_speed=speed, commanded_position=command, time=plain.time[:-1])
 
 
 def sampled_at_instants_that_scatter(plain):

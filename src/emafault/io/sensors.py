@@ -29,7 +29,6 @@ CLIPPED_SPEED = 8  # samples of the speed, which lies on a lattice, at an extrem
 CLIPPED_MOST = 0.5  # of the samples in motion, that may be lost
 MOTION = ("rotor_angle", "rotor_speed", "output_position")
 AROUND, NEAR = 9, 4  # samples on either side of one in which the angle may have lost counts, and those nearest
-LEAST = 3.0  # standard deviations from what rows that are missing would make of it
 SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
 FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
@@ -127,7 +126,7 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
 
     In that interval its change less the integrated speed stands out of those around it by more than these differ, and
     by more than any lag of either would make of how the speed changes there; and it stays. An angle that repeated the
-    sample before makes up for what it missed, and one that has turned as far as in whole intervals lacks these.
+    sample before makes up for what it missed, and where the command changes by more too, rows are missing.
     """
     angle, speed, h = recording.rotor_angle, recording.rotor_speed[1:], recording.interval
     beside = 2 * AROUND + 1
@@ -138,6 +137,7 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     scale = np.maximum(median_filter(off, beside, mode="nearest"), np.median(off)) / 0.6745
     changes = h * (maximum_filter1d(speed, beside) - minimum_filter1d(speed, beside))
     found = off > np.maximum(SPIKE * np.maximum(scale, spacing(angle) / np.sqrt(6.0)), changes)
+    steps = np.abs(np.diff(recording.commanded_position))
     rows, sizes = [], []
     for at in np.flatnonzero(found[AROUND:-AROUND]):
         around = beyond[at : at + beside]
@@ -145,9 +145,9 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
         size = level[AROUND : AROUND + NEAR].mean() - level[AROUND - NEAR : AROUND].mean()
         row = int(at) + AROUND + 1
         repeats, stays = angle[row - 1] == angle[row - 2], abs(size - around[AROUND]) < 0.5 * abs(size)
-        motion = (around.sum() - around[AROUND]) / (beside - 1) + h * float(np.median(speed[at : at + beside]))
-        missing = max(1.0, np.round(size / motion)) * motion if motion else 0.0
-        if stays and not repeats and abs(size - missing) > LEAST * scale[row - 1]:
+        commanded = steps[at : at + beside]
+        missing = commanded[AROUND] > 1.5 * np.delete(commanded, AROUND).max()
+        if stays and not repeats and not missing:
             rows.append(row)
             sizes.append(float(size))
     return np.array(rows, int), np.array(sizes)
