@@ -133,6 +133,8 @@ ELSEWHERE = {
     "torque_constant": ("function", function_of("current", 0.0, 3.0, [0.1, 0.1, 0.0, -0.1, -0.1, -0.2])),
     "inertia": ("step_change", {"jump": 0.5, "time": 0.0}),
     "back_emf": ("function", function_of("current", 0.0, 3.0, [0.0, -0.1, -0.1, -0.2, -0.2, -0.3])),
+    "torque_by_speed": ("order", {"amplitude": 0.02, "order": 1.0, "phase": 0.5}),
+    "torque_by_speed_squared": ("order", {"amplitude": 0.01, "order": 2.0, "phase": 0.0}),
     "resistance": ("function", function_of("rotor_speed", -150.0, 150.0, [0.3, 0.1, 0.0, 0.0, 0.1, 0.3])),
 }
 

@@ -12,10 +12,11 @@ PHASES = ("a", "b", "c")
 #: place in the machine, in the order of the simulations' terms -> unit of what a form adds there: to the driving
 #: torque, to a phase's back-EMF coefficient as a share of it, to its resistance, to the torque against the motion, to
 #: the electrical torque and to the rotor's inertia as a share of each, to back-EMF coefficient and resistance of all
-#: phases
+#: phases, and to the driving torque in proportion to the speed and to its square, of 100 rad/s each
 MACHINE = {
     "torque": "N m", **{f"emf_{j}": "1" for j in PHASES}, **{f"resistance_{j}": "ohm" for j in PHASES}, "drag": "N m",
     "torque_constant": "1", "inertia": "1", "back_emf": "1", "resistance": "ohm",
+    "torque_by_speed": "N m", "torque_by_speed_squared": "N m",
 }  # fmt: skip
 #: what stands in the record of a run: the shape of the back-EMF of all phases, each along its own electrical angle, and
 #: the windings of single phases -> unit of what a form adds to it

@@ -17,6 +17,7 @@ PLACES = tuple(MACHINE)
 AT_TORQUE, AT_EMF, AT_RESISTANCE, AT_DRAG, AT_TORQUE_CONSTANT, AT_INERTIA, OF_ALL_EMF, OF_ALL_RESISTANCE = (
     0, 1, 4, 7, 8, 9, 10, 11,
 )  # fmt: skip
+BY_SPEED, BY_SPEED_SQUARED = 12, 13
 CURRENT = list(COORDINATES).index("current")
 #: form -> names of its parameters, in the order of the row. SI; w is the rotor's speed and theta its angle, unwrapped.
 SHAPES = {
@@ -168,12 +169,13 @@ def remembered(row, w, current, memory, dt):
 
 @compiled
 def add_up(terms, t, theta, w, current, turned, temperature, memory, table, added):
-    """Fill ``added`` (place,) with what all terms (term, number) do, drag in the torque and what all phases have in
-    each; arguments as of ``acting``."""
+    """Fill ``added`` (place,) with what all terms (term, number) do: in the torque drag and what goes with the speed, in
+    each phase what all have; arguments as of ``acting``."""
     added[:] = 0.0
     for m in range(len(terms)):
         place = int(terms[m, 0])
         added[place] += acting(terms[m], t, theta, w, current, turned, temperature, memory[m], table)
+    added[AT_TORQUE] += (added[BY_SPEED] + added[BY_SPEED_SQUARED] * w / 100.0) * w / 100.0
     added[AT_TORQUE] -= np.sign(w) * added[AT_DRAG]
     for j in range(3):
         added[AT_EMF + j] += added[OF_ALL_EMF]

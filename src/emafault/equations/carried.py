@@ -23,7 +23,7 @@ Entry = dict[str, Any]
 #: equation -> place of what multiplies each of its drivers
 DRIVERS: dict[str, tuple[str, ...]] = {
     **{f"electrical_{j}": (f"voltage_{j}", f"resistance_{j}", f"voltage_per_speed_{j}") for j in PHASES},
-    "torque": ("torque", "drag", "torque_constant", "inertia"),
+    "torque": ("torque", "drag", "torque_constant", "inertia", "torque_by_speed", "torque_by_speed_squared"),
     "sensor_speed": ("speed", "speed_scale"),
     "sensor_current": ("current", "current_gain_a", "current_gain_b"),
     "position": ("output", "output_play", "output_twist"),

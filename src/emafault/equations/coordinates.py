@@ -82,7 +82,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     kinds["averaged"] = AVERAGED.get(equation, 1)
     if equation == "torque":
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
-        kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0}
+        kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0, 4: 0.0, 5: 0.0}
     if equation == "commutation":
         kinds["sizes"] = dict.fromkeys(range(1, 4), commutation.REACH / max(REMAINDER_SIZES))
     if equation == "control":
@@ -107,9 +107,9 @@ def drivers_of(state: State, equation: str, functions: Mapping[str, Any]) -> lis
     if equation.startswith("electrical"):
         j = "abc".index(equation[-1])
         out += [rec.current[:, j], np.asarray(state.regressor[j].value) * SWEPT]
-    elif equation == "torque":  # friction, torque constant, inertia
-        typical = typical_torque(rec.actuator)
-        out += [rec.direction, state.drive / typical, state.net / typical]
+    elif equation == "torque":  # friction, torque constant, inertia, and what goes with the speed and its square
+        typical, w = typical_torque(rec.actuator), rec.speed / 100.0
+        out += [rec.direction, state.drive / typical, state.net / typical, w, w * w]
     elif equation == "sensor_speed":  # at rest the angle's rate is its noise, which the residual has too
         out += [np.where(rec.moving, rec.speed / 100.0, 0.0)]
     elif equation == "sensor_current":

@@ -52,6 +52,8 @@ def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, fl
             ("a torque", "N m", 1.0), ("a drag against the motion", "N m", -1.0),
             ("the torque constant, as a share of it,", "1", 1.0 / torque),
             ("the inertia, as a share of it,", "1", -1.0 / torque),
+            ("a torque in proportion to the speed, of 100 rad/s,", "N m", 1.0),
+            ("a torque in proportion to the square of the speed, of 100 rad/s,", "N m", 1.0),
         ),
         "sensor_speed": (("the recorded speed", "rad/s", 1.0), ("the scale of the recorded speed", "1", 0.01)),
         "sensor_current": (
