@@ -169,8 +169,11 @@ def remembered(row, w, current, memory, dt):
 
 @compiled
 def add_up(terms, t, theta, w, current, turned, temperature, memory, table, added):
-    """Fill ``added`` (place,) with what all terms (term, number) do: in the torque drag and what goes with the speed, in
-    each phase what all have; arguments as of ``acting``."""
+    """Fill ``added`` (place,) with what all terms (term, number) do.
+
+    In the torque are drag and what goes with the speed as well, in each phase what all have; arguments as of
+    ``acting``.
+    """
     added[:] = 0.0
     for m in range(len(terms)):
         place = int(terms[m, 0])

@@ -1,5 +1,6 @@
 """A function of one coordinate: a cubic spline through six knots, constant beyond them. Its values at the knots add up
-to nothing, for a constant is a coefficient that every machine has; what goes with the current is nothing at none."""
+to nothing, for a constant is a coefficient that every machine has; what goes with the current is nothing at none, and
+what goes with the output angle nothing at its zero: no machine has a constant torque."""
 
 from collections.abc import Mapping
 
@@ -20,7 +21,7 @@ VALUES = tuple(f"at_{k + 1}" for k in range(KNOTS))
 COEFFICIENTS = tuple(f"c_{k + 1}" for k in range(KNOTS - 1))
 #: coordinate -> unit
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
-FROM_ZERO = "current"  # the coordinate at whose zero the machine is as it is without the form
+FROM_ZERO = ("current", "output_angle")  # the coordinates at whose zero the machine is as it is without the form
 #: (knot, coefficient) values that add up to nothing, and that begin with it
 BALANCED, ABOVE = null_space(np.ones((1, KNOTS))), np.eye(KNOTS)[:, 1:]
 CELLS = 40  # of the range
@@ -29,21 +30,27 @@ FEWEST = 3  # temperatures that show a function of it
 
 def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
     """(coefficient, row) splines of values at the knots."""
-    along = _along(shape)
-    return _splines(along, coordinates[along], np.linspace(shape["from"], shape["to"], KNOTS))
+    return _splines(shape, coordinates[_along(shape)])
 
 
 def _along(shape: Shape) -> str:
     return tuple(COORDINATES)[int(shape["coordinate"])]
 
 
-def _values(along: str) -> np.ndarray:
+def _values(shape: Shape) -> np.ndarray:
     """(knot, coefficient) values at the knots of a function of a coordinate."""
-    return ABOVE if along == FROM_ZERO else BALANCED
+    if _along(shape) not in FROM_ZERO:
+        return BALANCED
+    if shape["from"] >= 0.0:
+        return ABOVE
+    knots = np.linspace(shape["from"], shape["to"], KNOTS)
+    at_zero = CubicSpline(knots, np.eye(KNOTS), bc_type="not-a-knot")(min(0.0, knots[-1]))
+    return null_space(at_zero[None])
 
 
-def _splines(along: str, x, knots: np.ndarray) -> np.ndarray:
-    of = CubicSpline(knots, _values(along), bc_type="not-a-knot")
+def _splines(shape: Shape, x) -> np.ndarray:
+    knots = np.linspace(shape["from"], shape["to"], KNOTS)
+    of = CubicSpline(knots, _values(shape), bc_type="not-a-knot")
     return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
 
 
@@ -57,7 +64,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
         low, high = float(min(v.min() for v in x)), float(max(v.max() for v in x))
         if (along == "temperature" and len({float(v[0]) for v in x}) < FEWEST) or high - low < 1e-9:
             continue
-        if along == FROM_ZERO:
+        if along == "current":
             low = 0.0
         shape = {"coordinate": float(number), "from": low, "to": high}
         step = (high - low) / CELLS
@@ -66,7 +73,7 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
             return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
 
         cells = left.cells(cell, CELLS, driver)
-        splines = _splines(along, low + step * (np.arange(CELLS) + 0.5), np.linspace(low, high, KNOTS))
+        splines = _splines(shape, low + step * (np.arange(CELLS) + 0.5))
         value = gain(*of_cells(splines, cells))
         if best is None or value > best[1]:
             best = shape, value
@@ -87,7 +94,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
 
 def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
     """Values at the knots."""
-    return dict(zip(VALUES, (_values(_along(shape)) @ values).tolist(), strict=True))
+    return dict(zip(VALUES, (_values(shape) @ values).tolist(), strict=True))
 
 
 def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
