@@ -168,15 +168,21 @@ class Settling(NormalEquations):
         if that is better.
 
         A secant points the way only: its effect finds its place before anything that a scan proposed or no one has
-        described takes it, or finds none. Faults of the measuring chain stay: beside one that is not in the set no
-        effect finds its place.
+        described takes it, or beside that where the set fits better with both, or finds none. Faults of the measuring
+        chain stay: beside one that is not in the set no effect finds its place.
         """
         proposed = {f.id for f in self.described}
-        kept = [c for c in model.choices if self._kind(c.unit) != "remainder" and c.unit not in proposed]
-        found = self.settle(Model(tuple(kept)))
+        kept = tuple(c for c in model.choices if self._kind(c.unit) != "remainder" and c.unit not in proposed)
+        switched = self.here()
+        found, there = self.settle(Model(kept)), self.here()
+        if len(kept) < len(model.choices):
+            self.go_to(switched)
+            whole = self.settle(Model(model.choices))
+            if whole.log_posterior > found.log_posterior:
+                found, there, kept = whole, self.here(), model.choices
+            self.go_to(there)
         if found.log_posterior >= model.log_posterior:
             return found
-        there = self.here()
         self.go_to(begun)
         less = self.settle(Model(tuple(c for c in kept if c.unit not in new)))
         if less.log_posterior > found.log_posterior:
