@@ -271,3 +271,19 @@ def test_what_goes_with_the_current_is_nothing_at_none():
     np.testing.assert_allclose(of_current[::12], list(told.values()), atol=1e-9)
     of_speed = FORMS["function"].told(np.arange(1.0, 6.0), {**shape, "coordinate": 0.0})
     assert sum(of_speed.values()) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_goes_with_the_output_angle_is_nothing_at_its_zero():
+    """A spring that stiffens needs no constant torque beside it, which no machine has."""
+    shape = {"coordinate": 2.0, "from": -0.02, "to": 0.118}
+    angle = np.append(np.linspace(-0.02, 0.118, 60), 0.0)
+    columns = FORMS["function"].columns({"output_angle": angle}, shape)
+    np.testing.assert_allclose(columns[:, -1], 0.0, atol=1e-12)
+    stiffening = 120.0 * angle**3
+    found, *_ = np.linalg.lstsq(columns.T, stiffening, rcond=None)
+    np.testing.assert_allclose(found @ columns, stiffening, atol=1e-9)
+    told = FORMS["function"].told(found, shape)
+    np.testing.assert_allclose(list(told.values()), 120.0 * np.linspace(-0.02, 0.118, 6) ** 3, atol=1e-9)
+    beyond = {**shape, "from": -0.2, "to": -0.1}  # nothing where it is nearest to zero
+    nearest = FORMS["function"].columns({"output_angle": np.array([-0.1])}, beyond)
+    np.testing.assert_allclose(nearest, 0.0, atol=1e-12)

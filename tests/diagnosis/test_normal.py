@@ -1,5 +1,7 @@
 """Steps of the point within the reach of the priors, and to where a set fits better."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -192,6 +194,40 @@ def test_an_effect_far_from_its_secant_takes_the_place_of_a_form_that_looks_like
     assert bench.on == {"s"} and bench.point["s.t"] == pytest.approx(0.3, abs=0.05)
     again = bench._searched(bench.normal(bench.linearise(both, corrected=False), both), remainders=False)
     assert again.ranked()[0].units == ("s",)
+
+
+def test_an_effect_by_secant_finds_its_place_beside_a_form_that_is_there():
+    """Without the form, which explains far more, it had found none."""
+
+    class Mixed(Machine):
+        form, tau = Parameter("f", 0.0, 0.0, 100.0), Parameter("s.t", 0.0, 0.0, 1.0)
+        secants = [Parameter(f"s#{n}", 0.0, 0.0, 2.0, secant={"s.t": t}) for n, t in enumerate((2.0, 0.5))]  # noqa: RUF012
+        parameters = {p.name: p for p in (Parameter("a", 0.0, 0.0, 1.0), form, tau, *secants)}  # noqa: RUF012
+        units = (
+            Unit("s", "structural", ("torque",), [Variant([s]) for s in secants], Variant([tau])),
+            Unit("~f", "form", ("torque",), [Variant([form])], among=10.0, proposed=True),
+        )
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            noise, one, other, free = np.random.default_rng(6).standard_normal((4, ROWS))
+
+            def made(t):
+                return t * one + 0.2 * t**2 * other
+
+            t, steep = values.get("s.t", 0.0), one + 0.1 * free
+            columns = {"a": free, "f": steep, "s#0": made(2.0), "s#1": made(0.5), "s.t": one + 0.4 * t * other}
+            residual = noise + values["a"] * free + (values.get("f", 0.0) + 40.0) * steep + made(t) - made(1.0)
+            return [Block(recording, "torque", residual, columns, [np.ones(ROWS)], np.ones(ROWS, bool))]
+
+    class Scanned(Bench):
+        described = (SimpleNamespace(id="~f"),)
+
+    bench, both = Scanned(Mixed(), ["r"]), Model((Choice("s", 0, 1.0), Choice("~f", 0, 1.0)))
+    normal = bench.normal(bench.linearise(both, corrected=False), both)
+    found, _ = bench._fitted(both, corrected=False)
+    bench.settle(found, normal)
+    assert bench.on == {"s", "~f"}
+    assert bench.point["s.t"] == pytest.approx(1.0, abs=0.2) and bench.point["f"] == pytest.approx(-40.0, abs=0.3)
 
 
 def test_a_step_takes_out_what_the_point_holds_of_another_variant():
