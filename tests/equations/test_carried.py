@@ -93,7 +93,7 @@ def found(form, entry):
 
 
 #: of each driver a coefficient that is plain to see, in the units of the equation
-SIZES = {"electrical": (0.5, 0.3, 0.4), "torque": (0.01, 0.01, 0.01, 0.01), "sensor_speed": (2.0, 3.0)}
+SIZES = {"electrical": (0.5, 0.3, 0.4), "torque": (0.01,) * 6, "sensor_speed": (2.0, 3.0)}
 SIZES |= {"sensor_current": (0.3, 0.1, 0.1), "position": (1e-4, 1e-4, 1e-4), "bus": (1.0,)}
 
 

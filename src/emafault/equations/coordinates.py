@@ -83,6 +83,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
     if equation == "torque":
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
         kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0, 4: 0.0, 5: 0.0}
+        kinds["by_speed"] = (4, 5)  # drivers, a function of the speed times which is one by itself
     if equation == "commutation":
         kinds["sizes"] = dict.fromkeys(range(1, 4), commutation.REACH / max(REMAINDER_SIZES))
     if equation == "control":

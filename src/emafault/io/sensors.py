@@ -125,8 +125,8 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     (rad); (slip,) each, of a recording without spikes.
 
     In that interval its change less the integrated speed stands out of those around it by more than these differ, and
-    by more than any lag of either would make of how the speed changes there; and it stays. An angle that repeated the
-    sample before makes up for what it missed, and where the command changes by more too, rows are missing.
+    by more than any lag of either would make of how the speed changes there; and it stays. An angle that repeats
+    samples makes up for what it missed, and where the command changes by more too, rows are missing.
     """
     angle, speed, h = recording.rotor_angle, recording.rotor_speed[1:], recording.interval
     beside = 2 * AROUND + 1
@@ -144,7 +144,8 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
         level = np.cumsum(around - (around.sum() - around[AROUND]) / (beside - 1))
         size = level[AROUND : AROUND + NEAR].mean() - level[AROUND - NEAR : AROUND].mean()
         row = int(at) + AROUND + 1
-        repeats, stays = angle[row - 1] == angle[row - 2], abs(size - around[AROUND]) < 0.5 * abs(size)
+        repeats = bool(np.any(np.diff(angle[row - AROUND : row + AROUND]) == 0.0))
+        stays = abs(size - around[AROUND]) < 0.5 * abs(size)
         commanded = steps[at : at + beside]
         missing = commanded[AROUND] > 1.5 * np.delete(commanded, AROUND).max()
         if stays and not repeats and not missing:

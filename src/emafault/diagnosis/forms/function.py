@@ -58,7 +58,8 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     """The coordinate along which most stands out, a constant of the driver apart."""
     best: tuple[Shape, float] | None = None
     for number, along in enumerate(COORDINATES):
-        if along not in left.blocks[0].coordinates:
+        of = left.blocks[0].coordinates
+        if along not in of or (along == "rotor_speed" and driver in of.get("by_speed", ())):
             continue
         x = [np.asarray(b.coordinates[along]) for b in left.blocks]
         low, high = float(min(v.min() for v in x)), float(max(v.max() for v in x))

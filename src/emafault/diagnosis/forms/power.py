@@ -30,7 +30,8 @@ def _powers(speed: np.ndarray, exponents) -> np.ndarray:
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     """The best of a few exponents, a constant of the driver apart."""
-    if "rotor_speed" not in left.blocks[0].coordinates:
+    along = left.blocks[0].coordinates
+    if "rotor_speed" not in along or driver in along.get("by_speed", ()):
         return None
     top = max(float(np.abs(b.coordinates["rotor_speed"]).max()) for b in left.blocks)
     if top <= 0.0:
