@@ -37,3 +37,13 @@ def test_a_lag_of_the_speed_is_undone(case):
     inside = slice(20, -20)
     off = [np.std((r.rotor_speed - smooth)[inside]) for r in (undone["a.nc"], faulty["a.nc"])]
     assert off[0] < left * off[1]
+
+
+def test_counts_that_the_angle_has_lost_are_added():
+    plain = recorded("reversal")
+    angle = plain.rotor_angle + 6e-3 * (plain.time > 0.2)
+    bench = SimpleNamespace(described=(), machine=SimpleNamespace(actuator=ACTUATOR))
+    found = SimpleNamespace(verdict={"discovered": [{"unit": "~step_change"}]}, values={}, bench=bench)
+    undone, what = corrected(found, {"a.nc": replace(plain, rotor_angle=angle)})
+    assert what == ["counts that the angle's encoder has lost"]
+    np.testing.assert_allclose(undone["a.nc"].rotor_angle, plain.rotor_angle, atol=5e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.equations.quality import seen, told
-from emafault.io.sensors import calm_motion, slips
+from emafault.io.motion import calm_motion, slips
 from emafault.schema import check_unlisted
 
 from .conftest import in_steps, recorded

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
+from ..io.motion import slips, without_slips, without_spikes_of_motion
 from ..io.recording import Recording, write_recording
-from ..io.sensors import slips, without_slips, without_spikes, without_spikes_of_motion
+from ..io.sensors import without_spikes
 from ..resampled import before
 from ..switches import direction
 from .acquisition import CLOCKS, GAIN_NAMES, RATE, clock_names, drifting, full_range, rates, undone

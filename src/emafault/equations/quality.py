@@ -10,8 +10,9 @@ from scipy.ndimage import binary_dilation
 from ..actuator.grammar import EACH
 from ..io.currents_noise import adds_up, resting_noise
 from ..io.lattice import lattice_step
+from ..io.motion import MOTION, slips, without_outliers, without_spikes_of_motion
 from ..io.recording import Recording
-from ..io.sensors import FEWEST_SPIKES, MOTION, cut_off, slips, spikes, without_outliers, without_spikes_of_motion
+from ..io.sensors import FEWEST_SPIKES, cut_off, spikes
 from ..io.updates import repeated, updates
 from .signals import MAY_BE_SLOWER
 

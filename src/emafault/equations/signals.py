@@ -14,8 +14,9 @@ from ..actuator.sensors import CHANNEL, SensorNoise
 from ..diagnosis.described import PRIOR
 from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of_noise
 from ..io.lattice import lattice_step, spacing
+from ..io.motion import calm_motion
 from ..io.recording import Recording
-from ..io.sensors import bridged, calm_motion, cut_off, held, stalled, without_spikes
+from ..io.sensors import bridged, cut_off, held, stalled, without_spikes
 from ..io.updates import across, updates
 from .dual import Dual
 

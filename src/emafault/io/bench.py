@@ -15,8 +15,9 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError, shown
 from ..places import kind, refuse_folder
 from .joined import joined
+from .motion import calm_motion
 from .recording import Recording, read_recording, recordings_in
-from .sensors import calm_motion, refuse_mistaken, useless
+from .sensors import refuse_mistaken, useless
 
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
 

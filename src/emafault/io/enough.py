@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import InputError
 from .bench import Bench
+from .motion import without_outliers
 from .recording import VARIABLES, Recording
-from .sensors import without_outliers
 
 SAMPLES = 100_000  # that a diagnosis takes unless told otherwise
 LEAST = 1000  # that are worth a diagnosis
