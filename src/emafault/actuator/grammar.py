@@ -41,8 +41,9 @@ PLACES = MACHINE | IN_RUN | CHANNELS | FACTORS | CONTROLLER
 #: what a ``function`` goes along -> its unit; the rotor's speed, the current of the phases that conduct (half the sum
 #: of the magnitudes), the angle turned since the start over the gear ratio, time, the initial winding temperature
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
-#: of a memory: (current / 2)^2 (A2), magnitude of the speed over 100 rad/s, one from the start of the recording
-SOURCES = ("loss", "speed", "start")
+#: of a memory: (current / 2)^2 (A2), magnitude of the speed over 100 rad/s, one from the start of the recording, and
+#: what is left of one that is there at the start
+SOURCES = ("loss", "speed", "start", "decay")
 KNOTS = 6  # of a function, equally spaced
 MOST_TERMS = 8  # in the machine
 

@@ -18,7 +18,7 @@ AT_TORQUE, AT_EMF, AT_RESISTANCE, AT_DRAG, AT_TORQUE_CONSTANT, AT_INERTIA, OF_AL
     0, 1, 4, 7, 8, 9, 10, 11,
 )  # fmt: skip
 BY_SPEED, BY_SPEED_SQUARED = 12, 13
-CURRENT = list(COORDINATES).index("current")
+CURRENT, DECAY = list(COORDINATES).index("current"), float(SOURCES.index("decay"))
 #: form -> names of its parameters, in the order of the row. SI; w is the rotor's speed and theta its angle, unwrapped.
 SHAPES = {
     "order": ("amplitude", "order", "phase"),  # amplitude cos(order theta + phase)
@@ -27,7 +27,8 @@ SHAPES = {
     "pulse": ("jump", "time", "until"),
     "power": ("at_100_rad_s", "exponent"),  # at_100_rad_s (|w| / 100)^exponent
     "bump": ("depth", "centre", "width"),  # Gaussian about an angle of the turn; width is its standard deviation
-    "memory": ("gain", "time_constant", "source"),  # gain times its source filtered; a place in SOURCES
+    # gain times its source filtered, or what that lacks of one; a place in SOURCES
+    "memory": ("gain", "time_constant", "source"),
     "sweep": ("amplitude", "frequency", "rate", "phase"),  # a frequency that glides
     "burst": ("amplitude", "time", "decay", "frequency"),  # rings from a time on
     "travel": ("amplitude", "length"),  # against the motion, built up anew over a length after each reversal (Dahl)
@@ -133,7 +134,7 @@ def acting(row, t, theta, w, current, turned, temperature, memory, table):
         away = theta - b - TWO_PI * np.floor((theta - b) / TWO_PI + 0.5)
         return a * np.exp(-0.5 * (away / c) ** 2)
     if shape == MEMORY:
-        return a * memory
+        return a * (1.0 - memory if c == DECAY else memory)
     if shape == SWEEP:
         return a * np.cos(TWO_PI * t * (b + 0.5 * c * t) + d)
     if shape == BURST:

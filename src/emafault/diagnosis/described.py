@@ -22,6 +22,7 @@ STEPS = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # standard deviations of a scan,
 PRIOR = float(np.log(ONE_MORE_FORM / len(WORDS)))  # log odds of a form of one kind
 ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
+ALSO = "_also"  # after the id of a form that differs from one by a constant
 SPAN = 10.0  # widest prior of a coefficient over the noise of a row
 
 
@@ -182,21 +183,24 @@ def scanned(
             if FINER * roughly + PRIOR < float(np.log(places)):  # no shape near it is worth proposing
                 continue
             name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
-            fine = form.fine(left, driver, shape)
-            value, best = max(
-                ((f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in fine), key=lambda x: x[0]
-            )
-            if value > 0.0:
-                among = best.among * places
-                found.append((value, Described(name, word, equation, driver, best.shape, scale, among)))
+            fine = [(f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in form.fine(left, driver, shape)]
+            value = max(v for v, _ in fine)
+            # what differs by what is free beside it is as likely, and told apart by the prior of that alone
+            best = [f for v, f in fine if v == value] if value > 0.0 else []
+            for k, f in enumerate(best):
+                unit = name + ALSO * k
+                found.append((value, Described(unit, word, equation, driver, f.shape, scale, f.among * places)))
     return found
 
 
 def proposed(machine, found: Sequence[Proposal]) -> list[Described]:
     """The most probable of what scans have found, each in the channels and coefficients that it may lie in as well."""
-    out = [d for _, d in sorted(found, key=lambda x: (-x[0], x[1].id))][:PROPOSED]
+    every = [d for _, d in sorted(found, key=lambda x: (-x[0], x[1].id))]
+    most = [d for d in every if not d.id.endswith(ALSO)]
+    names = {d.id for d in most[:PROPOSED]}
+    out = [d for d in every if d.id.removesuffix(ALSO) in names]
     elsewhere: list[Described] = []
-    for form in (c for d in out[:CHANNELED] for c in _elsewhere(machine, d)):
+    for form in (c for d in most[:CHANNELED] for c in _elsewhere(machine, d)):
         if not any(form.same(other) for other in elsewhere):  # several equations may show it
             elsewhere.append(form)
     return [*out, *elsewhere]

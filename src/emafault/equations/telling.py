@@ -17,7 +17,10 @@ APART = 3.0  # standard deviations from nominal at which a controller's setting 
 TELLING = 0.02  # of a setting: smaller differences are not worth telling
 SHARED = ("speed_gain", "speed_integral_gain", "speed_limit")  # settings that a remainder of the control law may have
 SETTING = {"hysteresis": "half hysteresis band"}  # words, where the name has others
-WORDS = {"loss": "copper loss", "speed": "speed", "start": "time since the start"}
+WORDS = {
+    "loss": "builds up with the copper loss", "speed": "builds up with the speed",
+    "start": "builds up with the time since the start", "decay": "is there at the start and goes",
+}  # fmt: skip
 
 
 def subject(form: Described, actuator: ActuatorParameters) -> tuple[str, str, float]:
@@ -140,7 +143,7 @@ def _of_a_clock(form: Described) -> bool:
     """Whether it adds something that goes with time alone."""
     source = memory.SOURCES[int(form.values["source"])] if form.word == "memory" else "start"
     adds = form.channel not in COEFFICIENTS if form.channel else form.driver == 0
-    return adds and _along(form) == "time" and source == "start"
+    return adds and _along(form) == "time" and source in memory.OF_TIME
 
 
 def _warms_up(form: Described) -> bool:
@@ -199,7 +202,7 @@ def _sentence(form: Described, where: str, what: str, found: Mapping[str, tuple[
         )
     elif form.word == "memory":
         source = memory.SOURCES[int(form.values["source"])]
-        by = f"drifts by {of('offset')} from the start" if "offset" in found else f"builds up with the {WORDS[source]}"
+        by = f"drifts by {of('offset')} from the start" if "offset" in found else WORDS[source]
         says = f"{what} {by}, with a time constant of {of('time_constant')}"
     elif form.word == "travel":
         says = f"a drag of {of('amplitude')} builds up anew after each reversal, over a travel of {of('length')}"

@@ -1,5 +1,5 @@
 """What builds up with a time constant, from nothing at each recording's start: driven by loss or by speed, or as
-what warms up once it is switched on."""
+what warms up once it is switched on; or what is there at the start and goes."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,7 +16,9 @@ EACH = False
 POSITIVE = ("time_constant",)
 CHANNELS: tuple[str, ...] = ("current", "voltage", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("gain",)
-SOURCES = ("loss", "speed", "start")  # current squared (A2), magnitude of the speed (100 rad/s), one
+#: current squared (A2), magnitude of the speed (100 rad/s), one from the start on, and what that one yet lacks
+SOURCES = ("loss", "speed", "start", "decay")
+OF_TIME = ("start", "decay")  # which differ by a constant
 CONSTANTS = np.geomspace(0.05, 1.0, 6)  # of the longest recording
 
 
@@ -28,8 +30,9 @@ def columns(coordinates: Mapping, shape: Shape) -> np.ndarray:
 def _filtered(coordinates: Mapping, source: int, constant: float, step: float) -> np.ndarray:
     if SOURCES[source] == "loss":
         x = (0.5 * np.asarray(coordinates["current"])) ** 2
-    elif SOURCES[source] == "start":
-        return 1.0 - np.exp(-np.asarray(coordinates["time"]) / constant)
+    elif SOURCES[source] in OF_TIME:
+        left = np.exp(-np.asarray(coordinates["time"]) / constant)
+        return left if SOURCES[source] == "decay" else 1.0 - left
     else:
         x = np.abs(np.asarray(coordinates["rotor_speed"])) / 100.0
     share = 1.0 - np.exp(-step / constant)
@@ -57,14 +60,14 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     """The best of sources and time constants, a constant of the driver apart."""
     if any(n not in left.blocks[0].coordinates for n in ("current", "rotor_speed")):
         return None
-    tried = [(k, float(left.longest * c)) for k in range(len(SOURCES)) for c in CONSTANTS]
+    tried = [(k, float(left.longest * c)) for k, of in enumerate(SOURCES) if of != "decay" for c in CONSTANTS]
     values = _values(left, driver, tried, slow=True)
     source, constant = tried[int(np.argmax(values))]
     return {"source": float(source), "time_constant": constant}, float(values.max())
 
 
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
-    """The time constant."""
+    """The time constant, from the start on both of what builds up and of what goes: the scan takes a constant apart."""
     source = int(shape["source"])
 
     def likelihood(logs: Sequence[float]) -> list[float]:
@@ -73,8 +76,11 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     near, half = np.log(shape["time_constant"]), np.log(CONSTANTS[1] / CONSTANTS[0])
     log, deviation = refined(float(near), float(half), likelihood)
     at = float(np.exp(log))
-    found = (("source", shape["source"], 0.0, ""), ("time_constant", at, at * deviation, "s"))
-    return [Found(found, likelihood([log])[0], float(len(SOURCES) * len(CONSTANTS)))]
+    of = [SOURCES.index(n) for n in OF_TIME] if SOURCES[source] in OF_TIME else [source]
+    value, among = likelihood([log])[0], float(len(SOURCES) * len(CONSTANTS))
+    return [
+        Found((("source", float(k), 0.0, ""), ("time_constant", at, at * deviation, "s")), value, among) for k in of
+    ]
 
 
 def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
