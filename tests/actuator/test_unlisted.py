@@ -48,6 +48,7 @@ CUBE = function_of("current", 1.0, 6.0, [x**3 for x in range(1, 7)])
         (value("bump", theta=6.0 + 8.0 * np.pi, depth=0.2, centre=6.0, width=0.1), 0.2),
         (value("bump", theta=6.1, depth=0.2, centre=0.1, width=0.1), 0.2 * np.exp(-0.5 * (2.831853) ** 2)),
         (value("memory", memory=0.5, gain=0.2, time_constant=1.0, source=1), 0.1),
+        (value("memory", memory=0.25, gain=0.2, time_constant=1.0, source=3), 0.15),
         (value("sweep", t=0.5, amplitude=1.0, frequency=2.0, rate=4.0, phase=0.0), np.cos(2 * np.pi * 1.5)),
         (value("burst", t=0.1, amplitude=1.0, time=0.2, decay=0.1, frequency=10.0), 0.0),
         (value("burst", t=0.225, amplitude=1.0, time=0.2, decay=0.1, frequency=10.0), np.exp(-0.25)),

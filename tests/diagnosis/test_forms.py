@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import Described, WithForms, proposed, refined, scanned
+from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
 from emafault.diagnosis.forms import FORMS
+from emafault.diagnosis.forms.memory import columns
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.wandering import log_odds
 from emafault.diagnosis.whitening import WANDERING, Weights, coloured, filtered
@@ -96,6 +97,15 @@ def test_a_form_is_found_where_it_is(word, shape, sizes, driver):
             assert abs(value - shape[name]) < 5.0 * max(deviation, 1e-9) + 0.02 * abs(shape[name]), name
     if word == "order" and shape["order"] in (1.0, 2.0):
         assert first.values["order"] == shape["order"]  # what turns with the rotor
+
+
+def test_what_builds_up_from_the_start_may_be_what_goes():
+    found = Machine("memory", {"source": 2.0, "time_constant": 0.1}, (0.6,), 0).proposed()
+    first, also = (d for d in found if d.word == "memory")
+    assert {first.values["source"], also.values["source"]} == {2.0, 3.0}
+    assert first.values["time_constant"] == also.values["time_constant"] and also.id == first.id + ALSO
+    built, gone = (columns(coordinates(0), {"source": k, "time_constant": 0.1}) for k in (2.0, 3.0))
+    np.testing.assert_allclose(built + gone, 1.0)
 
 
 SIZES = [(c[0], c[1], c[2], c[3], n) for c in CASES for n in FORMS[c[0]].POSITIVE]

@@ -47,6 +47,14 @@ def test_the_shape_of_the_back_emf_is_told_by_its_harmonics():
     )
 
 
+def test_a_drag_that_goes_says_so():
+    shape = (("source", 3.0, 0.0, ""), ("time_constant", 0.02, 1e-3, "s"))
+    form = Described("~m", "memory", "torque", 2, shape, 0.1, 1.0)
+    said = telling.told(form, {"gain": (0.08, 0.001)}, ACTUATOR)
+    assert (said["equation"], said["form"], said["along"]) == ("torque", "memory", "time")
+    assert "is there at the start and goes, with a time constant of 0.02 s" in said["sentence"]
+
+
 def test_a_drag_that_builds_up_over_travel_is_a_memory_along_the_angle():
     form = Described("~t", "travel", "torque", 0, (("length", 4.2, 0.1, "rad"),), 0.1, 1.0)
     said = telling.told(form, {"amplitude": (0.018, 1e-4)}, ACTUATOR)

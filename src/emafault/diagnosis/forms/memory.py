@@ -10,7 +10,7 @@ from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
 from .spectrum import refined
 
-AXIS = "what has built up"  # of its picture
+AXIS = "what has built up, or is left"  # of its picture
 ALONG = "time"
 EACH = False
 POSITIVE = ("time_constant",)
