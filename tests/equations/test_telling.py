@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import Described
+from emafault.diagnosis.described import Described, proposed, with_forms
 from emafault.equations import telling
 from emafault.equations.telling_chain import told_of_chain
 
@@ -84,6 +84,26 @@ def test_a_wave_of_the_recorded_angle_moves_the_commutations_of_the_point():
 def test_a_wave_of_the_speeds_scale_may_be_one_of_the_angle():
     machine = machine_of({"a.nc": recorded()})
     assert machine.channels("sensor_speed", 1) == ("angle",) and machine.channels("torque", 1) == ()
+
+
+def test_what_several_equations_show_of_a_channel_has_the_shape_that_is_known_best():
+    machine = machine_of({"a.nc": recorded()})
+    roughly = Described("~p", "order", "position", 0, (("order", 1.001, 6e-4, "1"),), 1.0, 1.0)
+    whole = Described("~s", "order", "sensor_speed", 1, (("order", 1.0, 0.0, "1"),), 1.0, 1.0)
+    for found in ([(9.0, roughly), (5.0, whole)], [(5.0, roughly), (9.0, whole)]):
+        (of_angle,) = (d for d in proposed(machine, found) if d.channel)
+        assert (of_angle.channel, of_angle.values["order"], of_angle.seen) == ("angle", 1.0, "sensor_speed")
+    other = replace(roughly, shape=(("order", 1.01, 6e-4, "1"),))
+    assert len([d for d in proposed(machine, [(9.0, other), (5.0, whole)]) if d.channel]) == 2
+
+
+def test_a_wave_of_the_recorded_angle_goes_along_the_true_one():
+    recording = recorded("reversal")
+    wave = 0.02 * np.cos(recording.rotor_angle + 0.4)
+    form = Described("~o", "order", "sensor_angle", 0, (("order", 1.0, 0.0, "1"),), 1.0, 1.0, channel="angle")
+    machine = machine_of({"a.nc": replace(recording, rotor_angle=recording.rotor_angle + wave)})
+    found = with_forms(machine, [form]).wrong("a.nc", "angle", {form: 0.02 * np.array([np.cos(0.4), -np.sin(0.4)])})
+    np.testing.assert_allclose(found, wave, atol=1e-7)
 
 
 @pytest.mark.parametrize(("of", "said"), [

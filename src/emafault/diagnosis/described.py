@@ -22,6 +22,7 @@ STEPS = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # standard deviations of a scan,
 PRIOR = float(np.log(ONE_MORE_FORM / len(WORDS)))  # log odds of a form of one kind
 ALIKE = 0.9  # cosine from which a form is another one of a listed effect
 SAME = 4.0  # standard deviations
+IMPLICIT = 4  # iterations, each of which makes the error smaller by the slope of the wave
 ALSO = "_also"  # after the id of a form that differs from one by a constant
 SPAN = 10.0  # widest prior of a coefficient over the noise of a row
 
@@ -53,6 +54,10 @@ class Described:
             return False
         pairs = zip(self.shape, other.shape, strict=True)
         return all(abs(a[1] - b[1]) <= SAME * np.hypot(a[2], b[2]) + 1e-9 * abs(a[1]) for a, b in pairs)
+
+    def sharper(self, other: "Described") -> bool:
+        """Whether its shape is known better than that of another, the same one."""
+        return all(a[2] < b[2] for a, b in zip(self.shape, other.shape, strict=True))
 
     def names(self, recording: str) -> list[str]:
         """Its parameters as a recording has them."""
@@ -110,18 +115,34 @@ class WithForms:
     def _undone(self, values: Mapping[str, float], recording: str) -> dict[str, np.ndarray]:
         """By channel whose forms are taken off its signal, what their present coefficients say is wrong of it."""
         out: dict[str, np.ndarray] = {}
-        for form in self.forms:
-            here = np.array([values.get(n, 0.0) for n in form.names(recording)])
-            if here.any() and form.channel in getattr(self.machine, "undone", ()):
-                x = here @ FORMS[form.word].columns(self.machine.sampled(recording, form.channel), form.values)
-                out[form.channel] = out.get(form.channel, 0.0) + x
+        for channel in dict.fromkeys(f.channel for f in self.forms):
+            if channel in getattr(self.machine, "undone", ()):
+                mine = [f for f in self.forms if f.channel == channel]
+                own = {f: np.array([values.get(n, 0.0) for n in f.names(recording)]) for f in mine}
+                acting = {f: here for f, here in own.items() if here.any()}
+                if acting:
+                    out[channel] = self.wrong(recording, channel, acting)
         return out
+
+    def wrong(self, recording: str, channel: str, acting: Mapping[Described, np.ndarray]) -> np.ndarray:
+        """(sample,) what forms with these coefficients make wrong of a recording's channel.
+
+        A wave of the recorded angle goes along the true one, which is found from it by fixed-point iteration.
+        """
+        x = np.zeros(0)
+        for _ in range(IMPLICIT):
+            along = self.machine.sampled(recording, channel, x)
+            before, x = x, np.sum([c @ FORMS[f.word].columns(along, f.values) for f, c in acting.items()], axis=0)
+            if np.array_equal(before, x):
+                break
+        return x
 
     def columns(self, form: Described, block: Block, values: Mapping[str, float]) -> np.ndarray | None:
         """(column, row) of a form in a block at a point; None where it does not act there."""
         if form.channel and (form.channel, block.equation) in self.machine.moving:
-            x = FORMS[form.word].columns(self.machine.sampled(block.recording, form.channel), form.values)
             less = self._undone(values, block.recording)
+            along = self.machine.sampled(block.recording, form.channel, less.get(form.channel))
+            x = FORMS[form.word].columns(along, form.values)
             return self.machine.seen_at(values, block.recording, block.equation, x, less)
         key = block.recording, block.equation, form.id, form.shape
         if key not in self.known:
@@ -201,8 +222,11 @@ def proposed(machine, found: Sequence[Proposal]) -> list[Described]:
     out = [d for d in every if d.id.removesuffix(ALSO) in names]
     elsewhere: list[Described] = []
     for form in (c for d in most[:CHANNELED] for c in _elsewhere(machine, d)):
-        if not any(form.same(other) for other in elsewhere):  # several equations may show it
+        shown = next((k for k, other in enumerate(elsewhere) if form.same(other)), None)
+        if shown is None:
             elsewhere.append(form)
+        elif form.sharper(elsewhere[shown]):  # several equations may show it, one of them best
+            elsewhere[shown] = form
     return [*out, *elsewhere]
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.forms import FORMS
 from ..io.bench import new_folder
 from ..io.motion import slips, without_slips, without_spikes_of_motion
 from ..io.recording import Recording, write_recording
@@ -57,7 +56,7 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
         channel = form.channel or (f"voltage_{form.equation[-1]}" if of_voltage else "")
         if form.id in told and channel and channel not in COEFFICIENTS:
             own = np.array([values.get(n, 0.0) for n in form.names(name)])
-            x = own @ FORMS[form.word].columns(found.bench.machine.sampled(name, form.channel), form.values)
+            x = found.bench.machine.wrong(name, form.channel, {form: own})
             words = f"{form.word.replace('_', ' ')} of the {channel.replace('_', ' of phase ')} channel"
             yield words, partial(_less, channel=channel, x=x)
     for quantity in ("voltage", "current", "output", "speed", "angle", "bus_voltage"):

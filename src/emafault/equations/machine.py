@@ -286,14 +286,18 @@ class ReferenceActuator:
             out |= _in_voltage(state, j, -x * np.asarray(state.current[j].value))
         return out
 
-    def sampled(self, name: str, place: str) -> dict[str, Any]:
+    def sampled(self, name: str, place: str, less: np.ndarray | None = None) -> dict[str, Any]:
         """What the samples of a recording's channel lie along: those of an angle are taken at an interval's end, where
-        the others are means over it."""
+        the others are means over it.
+
+        ``less`` : (sample,) what an angle has too much
+        """
         rec = self.recordings[name]
         found = self._functions_of(rec)
         if place not in ("angle", "output"):
             return {**found, "averaged": 1}
-        return {**found, "angle": rec.angle, "rotor_angle": np.mod(rec.angle, 2.0 * np.pi), "averaged": 0}
+        angle = rec.angle if place != "angle" or less is None or not len(less) else rec.angle - less
+        return {**found, "angle": angle, "rotor_angle": np.mod(angle, 2.0 * np.pi), "averaged": 0}
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
         state = State(rec, Point(values, rec.name, wanted))
