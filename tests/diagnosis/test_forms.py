@@ -108,6 +108,39 @@ def test_what_builds_up_from_the_start_may_be_what_goes():
     np.testing.assert_allclose(built + gone, 1.0)
 
 
+def test_a_function_may_be_one_over_a_part_of_the_range_and_nothing_on_a_side_of_that():
+    part = {"coordinate": 3.0, "from": 0.31, "to": 0.42, "nothing": 1.0}
+    found = Machine("function", part, (0.5, 0.9, 1.1, 0.9, 0.6), 0).proposed()
+    first, also = (d for d in found if d.word == "function")
+    assert {first.values["nothing"], also.values["nothing"]} == {1.0, 2.0} and also.id == first.id + ALSO
+    for end in ("from", "to"):
+        assert first.values[end] == also.values[end] == pytest.approx(part[end], abs=0.05)  # of 0.8 s
+    machine = Machine("function", part, (0.5, 0.9, 1.1, 0.9, 0.6), 0)
+    better = refined(WithForms(machine, [first]), first, machine.found, machine.carried, {}, {})
+    assert better.values["from"] < better.values["to"]
+
+
+@pytest.mark.parametrize(("word", "shape", "possible"), [
+    ("function", {"coordinate": 3.0, "from": 0.2, "to": 0.2}, False), ("pulse", {"time": 0.3, "until": 0.2}, False),
+    ("function", {"coordinate": 3.0, "from": 0.2, "to": 0.3}, True), ("bump", {"centre": 1.0, "width": 0.0}, False),
+    ("power", {"exponent": 0.5}, True),
+])  # fmt: skip
+def test_ends_are_in_order_and_sizes_above_zero(word, shape, possible):
+    form = Described("~x", word, "torque", 0, tuple((n, v, 1.0, "") for n, v in shape.items()), 1.0, 1.0)
+    assert form.possible is possible
+
+
+def test_beyond_a_part_a_function_is_nothing_on_one_side():
+    x = np.array([0.0, 0.25, 1.0])
+    part = {"coordinate": 3.0, "from": 0.2, "to": 0.3}
+    above, below = (FORMS["function"].columns({"time": x}, part | {"nothing": k}) for k in (1.0, 2.0))
+    for of, nothing, acts in ((above, 0, 2), (below, 2, 0)):
+        np.testing.assert_allclose(of[:, nothing], 0.0, atol=1e-12)
+        assert abs(of[:, acts]).max() == pytest.approx(1.0) and abs(of[:, 1]).sum() > 0.1
+    told = FORMS["function"].told(np.arange(1.0, 6.0), part | {"nothing": 2.0})
+    assert list(told.values()) == [1.0, 2.0, 3.0, 4.0, 5.0, 0.0]
+
+
 SIZES = [(c[0], c[1], c[2], c[3], n) for c in CASES for n in FORMS[c[0]].POSITIVE]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from .evidence import SETTLED, Definite, Reduced
 from .forms import FORMS
-from .left import Left, beside_first, gain
+from .left import Found, Left, beside_first, gain
 from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
 from .search import Search
@@ -45,6 +45,13 @@ class Described:
     def values(self) -> dict[str, float]:
         """Its shape by name."""
         return {n: v for n, v, _, _ in self.shape}
+
+    @property
+    def possible(self) -> bool:
+        """Whether its sizes are above zero and its ends in their order."""
+        form, values = FORMS[self.word], self.values
+        ends = [values[n] for n in form.ENDS]
+        return all(values[n] > 0.0 for n in form.POSITIVE) and ends == sorted(set(ends))
 
     def same(self, other: "Described") -> bool:
         """Whether it is another where this one is, its shape no further than scans of both may be off."""
@@ -200,15 +207,18 @@ def scanned(
             coarse = [(*at, d) for d in range(left.drivers) if (at := form.coarse(left, d)) is not None]
             if not coarse:
                 continue
-            shape, roughly, driver = max(coarse, key=lambda c: c[1])
-            if FINER * roughly + PRIOR < float(np.log(places)):  # no shape near it is worth proposing
-                continue
+            value, best, driver = -np.inf, list[Found](), 0
+            for shape, roughly, d in sorted(coarse, key=lambda c: -c[1]):
+                # no shape near it is worth proposing, or better than that of another driver
+                if FINER * roughly + PRIOR - float(np.log(places)) < max(value, 0.0):
+                    break
+                fine = [(f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in form.fine(left, d, shape)]
+                most = max(v for v, _ in fine)
+                if most > value:
+                    # what differs by what is free beside it is as likely, and told apart by the prior of that alone
+                    value, best, driver = most, [f for v, f in fine if v == most], d
             name, scale = f"~{word}_{equation}_{driver}_{mark}", left.scale(driver)
-            fine = [(f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in form.fine(left, driver, shape)]
-            value = max(v for v, _ in fine)
-            # what differs by what is free beside it is as likely, and told apart by the prior of that alone
-            best = [f for v, f in fine if v == value] if value > 0.0 else []
-            for k, f in enumerate(best):
+            for k, f in enumerate(best if value > 0.0 else []):
                 unit = name + ALSO * k
                 found.append((value, Described(unit, word, equation, driver, f.shape, scale, f.among * places)))
     return found
@@ -299,25 +309,24 @@ def refined(
     best, before = value(form), -np.inf
     while best - before >= SETTLED:
         before = best
-        for k, (name, _, width, _) in enumerate(form.shape):
+        for k, (_, _, width, _) in enumerate(form.shape):
             if width > 0.0:
-                form, best = _along(value, form, best, k, name in module.POSITIVE)
+                form, best = _along(value, form, best, k)
     return form
 
 
-def _along(
-    value: Callable[[Described], float], form: Described, best: float, k: int, positive: bool
-) -> tuple[Described, float]:
+def _along(value: Callable[[Described], float], form: Described, best: float, k: int) -> tuple[Described, float]:
     """A form, and its value, at the best of several steps of one parameter of its shape, or at the vertex of the
     parabola through that and its neighbours."""
     name, at, width, unit = form.shape[k]
 
-    def stepped(step: float) -> tuple[float, Described]:
-        shape = (*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :])
-        moved = replace(form, shape=shape)
-        return (best if step == 0.0 else value(moved)), moved
+    def moved(step: float) -> Described:
+        return replace(form, shape=(*form.shape[:k], (name, at + step * width, width, unit), *form.shape[k + 1 :]))
 
-    steps = [s for s in STEPS if not positive or at + s * width > 0.0]
+    def stepped(step: float) -> tuple[float, Described]:
+        return (best if step == 0.0 else value(moved(step))), moved(step)
+
+    steps = [s for s in STEPS if s == 0.0 or moved(s).possible]
     found = [stepped(s) for s in steps]
     top = max(range(len(steps)), key=lambda i: found[i][0])
     if 0 < top < len(steps) - 1:

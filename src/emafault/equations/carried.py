@@ -73,6 +73,7 @@ def of_form(
     shape = dict(form.values)
     if form.word == "function":
         entry["along"] = tuple(function.COORDINATES)[int(shape.pop("coordinate"))]
+        shape.pop("nothing", None)
         values = told(recordings[0])
         return _rounded(entry | shape | {"values": [values[n] for n in function.VALUES]})
     if form.word == "memory":

@@ -6,6 +6,7 @@ ALONG : the coordinate, as the verdict names it
 CHANNELS : quantities whose channel may have the form, rather than the equation
 EACH : whether its coefficients are each recording's own
 POSITIVE : names of its shape that are sizes: below zero there is no such form, or one that grows without bound
+ENDS : names of its shape of which the second is beyond the first, if any
 COEFFICIENTS : a name for each of its columns
 columns(coordinates, shape) : (column, row) without the driver, of a shape by name
 coarse(left, driver) : a shape by name near which most stands out of what an equation leaves, with its approximate log

@@ -10,6 +10,7 @@ AXIS = "angle of the rotor (rad)"  # of its picture
 ALONG = "rotor_angle"
 EACH = False
 POSITIVE = ("width",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("depth",)
 CELLS = 36  # of the turn

@@ -12,6 +12,7 @@ AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "time"
 EACH = True
 POSITIVE = ("frequency",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("current", "voltage", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
 PERIODS = 3.0  # fewest in a recording

@@ -1,8 +1,9 @@
-"""A function of one coordinate: a cubic spline through six knots, constant beyond them. Its values at the knots add up
-to nothing, for a constant is a coefficient that every machine has; what goes with the current is nothing at none, and
-what goes with the output angle nothing at its zero: no machine has a constant torque."""
+"""A function of one coordinate: a cubic spline through six knots, constant beyond them, over the whole range of the
+coordinate or over a part of it. Its values at the knots add up to nothing, for a constant is a coefficient that every
+machine has; over a part it is nothing on one side of that. What goes with the current is nothing at none, and what goes
+with the output angle nothing at its zero: no machine has a constant torque."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -22,9 +23,13 @@ COEFFICIENTS = tuple(f"c_{k + 1}" for k in range(KNOTS - 1))
 #: coordinate -> unit
 COORDINATES = {"rotor_speed": "rad/s", "current": "A", "output_angle": "rad", "time": "s", "temperature": "degC"}
 FROM_ZERO = ("current", "output_angle")  # the coordinates at whose zero the machine is as it is without the form
-#: (knot, coefficient) values that add up to nothing, and that begin with it
-BALANCED, ABOVE = null_space(np.ones((1, KNOTS))), np.eye(KNOTS)[:, 1:]
-CELLS = 40  # of the range
+#: (knot, coefficient) values that add up to nothing, that begin with it, and that end with it
+BALANCED, ABOVE, BELOW = null_space(np.ones((1, KNOTS))), np.eye(KNOTS)[:, 1:], np.eye(KNOTS)[:, :-1]
+NOTHING = (BALANCED, ABOVE, BELOW)  # by the number that a shape has, of what differs by a constant
+CELLS = 64  # of the range
+PARTS = (2, 4, 8)  # of the range, each of which half overlaps the next
+ENDS = ("from", "to")
+NEARER = 4  # times that the ends of a part are looked for, each to half the width
 FEWEST = 3  # temperatures that show a function of it
 
 
@@ -40,7 +45,7 @@ def _along(shape: Shape) -> str:
 def _values(shape: Shape) -> np.ndarray:
     """(knot, coefficient) values at the knots of a function of a coordinate."""
     if _along(shape) not in FROM_ZERO:
-        return BALANCED
+        return NOTHING[int(shape.get("nothing", 0.0))]
     if shape["from"] >= 0.0:
         return ABOVE
     knots = np.linspace(shape["from"], shape["to"], KNOTS)
@@ -55,42 +60,85 @@ def _splines(shape: Shape, x) -> np.ndarray:
 
 
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
-    """The coordinate along which most stands out, a constant of the driver apart."""
+    """The coordinate along which most stands out, over all of its range or a part, a constant of the driver apart."""
     best: tuple[Shape, float] | None = None
     for number, along in enumerate(COORDINATES):
         of = left.blocks[0].coordinates
         if along not in of or (along == "rotor_speed" and driver in of.get("by_speed", ())):
             continue
-        x = [np.asarray(b.coordinates[along]) for b in left.blocks]
-        low, high = float(min(v.min() for v in x)), float(max(v.max() for v in x))
-        if (along == "temperature" and len({float(v[0]) for v in x}) < FEWEST) or high - low < 1e-9:
+        low, high = _range(left, along)
+        few = along == "temperature" and len({float(b.coordinates[along][0]) for b in left.blocks}) < FEWEST
+        if few or high - low < 1e-9:
             continue
-        if along == "current":
-            low = 0.0
-        shape = {"coordinate": float(number), "from": low, "to": high}
         step = (high - low) / CELLS
 
         def cell(b: Block, along: str = along, low: float = low, step: float = step) -> np.ndarray:
             return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
 
         cells = left.cells(cell, CELLS, driver)
-        splines = _splines(shape, low + step * (np.arange(CELLS) + 0.5))
-        value = gain(*of_cells(splines, cells))
-        if best is None or value > best[1]:
-            best = shape, value
+        parts = _parts(along, low, high)
+        shapes = [{"coordinate": float(number), "from": f, "to": t, "nothing": 0.0} for f, t in parts]
+        splines = [_splines(s, low + step * (np.arange(CELLS) + 0.5)) for s in shapes]
+        g, G = of_cells(np.vstack(splines), cells)
+        for n, shape in enumerate(shapes):
+            mine = slice(n * len(COEFFICIENTS), (n + 1) * len(COEFFICIENTS))
+            value = gain(g[mine], G[mine, mine]) - float(np.log(max(1, len(shapes) - 1) if n else 1))
+            if best is None or value > best[1]:
+                best = shape, value
     return best
 
 
+def _range(left: Left, along: str) -> tuple[float, float]:
+    """Least and largest value of a coordinate, a current's from zero."""
+    x = [np.asarray(b.coordinates[along]) for b in left.blocks]
+    return 0.0 if along == "current" else float(min(v.min() for v in x)), float(max(v.max() for v in x))
+
+
+def _parts(along: str, low: float, high: float) -> list[tuple[float, float]]:
+    """The range of a coordinate and parts of it; temperatures are too few to have any."""
+    parts = [(low, high)]
+    for n in PARTS if along != "temperature" else ():
+        width = (high - low) / n
+        parts += [(low + 0.5 * k * width, low + (0.5 * k + 1.0) * width) for k in range(2 * n - 1)]
+    return parts
+
+
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
-    """The same: knots are where the range has them."""
-
-    def of(b: Block) -> np.ndarray:
-        return np.vstack([np.ones(len(b.residual)), columns(b.coordinates, shape)])
-
-    value = gain(*beside_first(*left.products(of, driver)))
+    """The same over the whole range, where knots are where the range has them, or the part's ends, one after the other:
+    the whole range is as likely as all parts together."""
     along = _along(shape)
-    found = tuple((n, v, 0.0, "" if n == "coordinate" else COORDINATES[along]) for n, v in shape.items())
-    return [Found(found, value, float(len(COORDINATES)))]
+    low, high = _range(left, along)
+    parts = len(_parts(along, low, high)) - 1
+
+    def values(shapes: Sequence[Shape]) -> list[float]:
+        def of(b: Block) -> np.ndarray:
+            return np.vstack([np.ones(len(b.residual)), *(columns(b.coordinates, s) for s in shapes)])
+
+        g, G = left.products(of, driver)
+        each = [[0, *range(k, k + len(COEFFICIENTS))] for k in range(1, len(g), len(COEFFICIENTS))]
+        return [gain(*beside_first(g[k], G[np.ix_(k, k)])) for k in each]
+
+    whole = {**shape, "from": low, "to": high}
+    out = [_found(whole, 0.0, values([whole])[0], 2.0 if parts else 1.0)]
+    if (shape["from"], shape["to"]) == (low, high):
+        return out
+    width, value = 0.25 * (shape["to"] - shape["from"]), -np.inf
+    for _ in range(NEARER):
+        for end in ENDS:
+            tried = [{**shape, end: shape[end] + s} for s in width * np.arange(-2.0, 3.0)]
+            tried = [s for s in tried if s["to"] - s["from"] > width]
+            at = values(tried)
+            shape, value = tried[int(np.argmax(at))], max(at)
+        width *= 0.5
+    sides = (1.0, 2.0) if along not in FROM_ZERO else (0.0,)
+    return out + [_found({**shape, "nothing": side}, width, value, 2.0 * parts) for side in sides]
+
+
+def _found(shape: Shape, width: float, value: float, among: float) -> Found:
+    """A shape whose ends are known to a ``width``."""
+    unit = COORDINATES[_along(shape)]
+    of = tuple((n, float(v), width if n in ENDS else 0.0, unit if n in ENDS else "") for n, v in shape.items())
+    return Found(of, value, len(COORDINATES) * among)
 
 
 def told(values: np.ndarray, shape: Shape) -> dict[str, float]:

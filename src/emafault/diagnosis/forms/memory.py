@@ -14,6 +14,7 @@ AXIS = "what has built up, or is left"  # of its picture
 ALONG = "time"
 EACH = False
 POSITIVE = ("time_constant",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("current", "voltage", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("gain",)
 #: current squared (A2), magnitude of the speed (100 rad/s), one from the start on, and what that one yet lacks

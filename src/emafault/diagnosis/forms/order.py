@@ -12,6 +12,7 @@ AXIS = "phase of the wave (rad)"  # of its picture
 ALONG = "order"
 EACH = False
 POSITIVE = ("order",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("angle",)  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
 CELLS = 64  # a turn

@@ -11,6 +11,7 @@ AXIS = "rotor speed (rad/s)"  # of its picture
 ALONG = "rotor_speed"
 EACH = False
 POSITIVE = ("exponent",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("at_100_rad_s",)
 EXPONENTS = (0.5, 1.5, 2.0, 3.0)  # between them are the constant and the slope that every machine has

@@ -8,6 +8,7 @@ from ..left import Found, Left, Shape, of_cells, singly
 from . import step_change
 
 # beside its two times it is what a jump is
+ENDS = ("time", "until")
 AXIS, ALONG, EACH, POSITIVE = step_change.AXIS, step_change.ALONG, step_change.EACH, step_change.POSITIVE
 CHANNELS, COEFFICIENTS, CELLS = step_change.CHANNELS, step_change.COEFFICIENTS, step_change.CELLS
 told, position = step_change.told, step_change.position

@@ -10,6 +10,7 @@ AXIS = "time (s)"  # of its picture
 ALONG = "time"
 EACH = False
 POSITIVE: tuple[str, ...] = ()
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("current", "voltage", "angle", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("jump",)
 CELLS = 32

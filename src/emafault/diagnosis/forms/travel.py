@@ -13,6 +13,7 @@ AXIS = "share that has built up"  # of its picture
 ALONG = "rotor_angle"
 EACH = False
 POSITIVE = ("length",)
+ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ()
 COEFFICIENTS = ("amplitude",)
 LENGTHS = 2.0 * np.pi * np.geomspace(0.02, 2.0, 7)  # of turns, to rad
