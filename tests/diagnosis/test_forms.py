@@ -1,12 +1,13 @@
 """Described forms: each is found where it is, none where there is none, and found forms are columns like any other."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
-from emafault.diagnosis.forms import FORMS
+from emafault.diagnosis.forms import FORMS, function
 from emafault.diagnosis.forms.memory import columns
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.wandering import log_odds
@@ -128,6 +129,36 @@ def test_a_function_may_be_one_over_a_part_of_the_range_and_nothing_on_a_side_of
 def test_ends_are_in_order_and_sizes_above_zero(word, shape, possible):
     form = Described("~x", word, "torque", 0, tuple((n, v, 1.0, "") for n, v in shape.items()), 1.0, 1.0)
     assert form.possible is possible
+
+
+WHOLE = (("coordinate", 2.0, 0.0, ""), ("from", -0.02, 0.0, "rad"), ("to", 0.1, 0.0, "rad"), ("nothing", 0.0, 0.0, ""))
+
+
+def test_over_more_recordings_a_function_is_the_same_over_their_range():
+    wide = function.widened(WHOLE, {"output_angle": (-0.05, 0.08)})
+    before, after = ({n: v for n, v, _, _ in shape} for shape in (WHOLE, wide))
+    assert (after["from"], after["to"]) == (-0.05, 0.1)
+    x = {"output_angle": np.linspace(0.0, 0.1, 9)}
+    cubic = np.linalg.lstsq(function.columns(x, before).T, 1e3 * x["output_angle"] ** 3)[0]
+    straight = np.linalg.lstsq(function.columns(x, before).T, x["output_angle"])[0]
+    for coefficients in (cubic, straight):
+        same = function.converted(coefficients, before, after)
+        inside = {"output_angle": np.linspace(0.02, 0.1, 9)}  # near the end that it had a kink comes in
+        was, is_now = coefficients @ function.columns(inside, before), same @ function.columns(inside, after)
+        np.testing.assert_allclose(is_now, was, atol=0.02 * np.ptp(was))
+    part = tuple((n, v, 0.01 if n == "from" else 0.0, unit) for n, v, _, unit in WHOLE)
+    assert function.widened(part, {"output_angle": (-0.05, 0.2)}) == part
+
+
+def test_rows_beyond_where_a_function_was_seen_say_nothing_of_it():
+    machine = Machine()
+    shape = (("coordinate", 2.0, 0.0, ""), ("from", 0.0, 0.0, "rad"), ("to", 0.01, 0.0, "rad"))
+    form = Described("~f", "function", "torque", 0, shape, 1.0, 1.0)
+    (block,) = WithForms(machine, [form]).blocks({}, "one", wanted=())
+    angle = machine.found[0].coordinates["output_angle"]
+    assert block.usable.any() and np.array_equal(block.usable, (angle >= 0.0) & (angle <= 0.01))
+    part = replace(form, shape=tuple((n, v, 1e-3 * (n == "to"), unit) for n, v, _, unit in shape))
+    assert WithForms(machine, [part]).blocks({}, "one", wanted=())[0].usable.all()
 
 
 def test_beyond_a_part_a_function_is_nothing_on_one_side():

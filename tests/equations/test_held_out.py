@@ -1,5 +1,6 @@
 """What a misfit on recordings set aside is compared with."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from types import SimpleNamespace
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from emafault.diagnosis.closure import Ladder
+from emafault.diagnosis.described import Described
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Unit
 from emafault.diagnosis.sets import Choice, Model
@@ -25,7 +27,7 @@ def ladder():
     bench = Bench(machine, list(machine.recordings))
     bench.settle(NOTHING)
     bench.linearise(renew=True)
-    return Ladder(bench, list(machine.recordings)), bench.values()
+    return Ladder(bench, list(machine.recordings), bench.described), bench.values()
 
 
 def electrical(ladder, values, **options):
@@ -47,6 +49,24 @@ def test_a_coefficient_that_multiplies_noise_loses_nothing_by_that(ladder):
     before, own, rows = electrical(fixed, values, corrected=True)
     assert part - own > 4.0 * np.sqrt(0.05 * rows)
     assert before - own < raw - part < raw - own
+
+
+def test_recordings_set_aside_are_predicted_with_the_shapes_that_the_prediction_has():
+    """The fit to all recordings may refine them, and its coefficients are then those of another form."""
+    machine = machine_of({"a.nc": recorded("sine")})
+    shape = (("order", 2.0, 0.01, "1"),)
+    form = Described("~o", "order", "torque", 0, shape, 1.0, 1.0)
+    bench = Bench(machine, ["a.nc"])
+    bench.describe([replace(form, shape=(("order", 2.1, 0.01, "1"),))])
+    bench.settle(NOTHING)
+    bench.linearise(renew=True)
+    values = bench.values() | {"form.~o.cosine": 0.02}
+    misfits = [
+        sum(w.gram[-1, -1] for w in Ladder(bench, ["a.nc"], [f]).blocks(values) if w.equation == "torque")
+        for f in (form, *bench.described)
+    ]
+    assert Ladder(bench, ["a.nc"], [form]).machine.forms == (form,) and bench.described != (form,)
+    assert abs(misfits[0] - misfits[1]) > 100.0
 
 
 def test_the_controller_s_settings_are_refitted_where_they_are_no_part_of_the_gap(ladder):

@@ -86,15 +86,29 @@ def test_a_wave_of_the_speeds_scale_may_be_one_of_the_angle():
     assert machine.channels("sensor_speed", 1) == ("angle",) and machine.channels("torque", 1) == ()
 
 
+def test_a_wave_of_the_output_may_be_one_of_its_recorder():
+    machine = machine_of({"a.nc": recorded()})
+    wave = Described("~w", "order", "position", 0, (("order", 0.48, 0.01, "1"),), 1.0, 1.0)
+    assert {d.channel for d in proposed(machine, [(9.0, wave)])} == {"", "angle", "output"}
+
+
+@pytest.mark.parametrize(("share", "says"), [(0.15, "15 % too low at 20 A"), (-0.15, "15 % too high at 20 A")])
+def test_a_bent_curve_says_which_way(share, says):
+    said = told_of_chain(
+        "~curve_current", "sensor_current", {"curve.current_a": (share, 1e-3)}, {"curve.current_a": "1"}, ACTUATOR
+    )
+    assert said["sentence"].endswith(f"{says}.")
+
+
 def test_what_several_equations_show_of_a_channel_has_the_shape_that_is_known_best():
     machine = machine_of({"a.nc": recorded()})
     roughly = Described("~p", "order", "position", 0, (("order", 1.001, 6e-4, "1"),), 1.0, 1.0)
     whole = Described("~s", "order", "sensor_speed", 1, (("order", 1.0, 0.0, "1"),), 1.0, 1.0)
     for found in ([(9.0, roughly), (5.0, whole)], [(5.0, roughly), (9.0, whole)]):
-        (of_angle,) = (d for d in proposed(machine, found) if d.channel)
-        assert (of_angle.channel, of_angle.values["order"], of_angle.seen) == ("angle", 1.0, "sensor_speed")
+        (of_angle,) = (d for d in proposed(machine, found) if d.channel == "angle")
+        assert (of_angle.values["order"], of_angle.seen) == (1.0, "sensor_speed")
     other = replace(roughly, shape=(("order", 1.01, 6e-4, "1"),))
-    assert len([d for d in proposed(machine, [(9.0, other), (5.0, whole)]) if d.channel]) == 2
+    assert len([d for d in proposed(machine, [(9.0, other), (5.0, whole)]) if d.channel == "angle"]) == 2
 
 
 def test_a_wave_of_the_recorded_angle_goes_along_the_true_one():

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .described import Described
 from .evidence import Definite, Normal
 from .fit import Bench
 from .linear import White, assemble, columns_of_forms, compressed, correct, disturbance, white_rows
@@ -22,11 +23,17 @@ class Ladder:
 
     That is its initial winding temperature, its seeded fault and what else of its nuisances is its own, but for its
     controller's timing; of a form of the measuring chain only if the model has it.
+
+    Parameters
+    ----------
+    bench : of all recordings
+    recordings : those that confirm
+    forms : described ones, with the shapes that the frozen models have them in
     """
 
-    def __init__(self, bench: Bench, recordings: Sequence[str]):
-        self.machine, self.recordings = bench.machine, list(recordings)
-        self.parameters, self.carried = bench.parameters, bench.carried
+    def __init__(self, bench: Bench, recordings: Sequence[str], forms: Sequence[Described]):
+        self.machine, self.recordings = bench.machine.having(forms), list(recordings)
+        self.parameters, self.carried = self.machine.parameters, bench.carried
         self.nuisances = set(bench.nuisances)
 
     def blocks(

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .evidence import SETTLED, Definite, Reduced
-from .forms import FORMS
-from .left import Found, Left, beside_first, gain
+from .forms import FORMS, function
+from .left import Found, Known, Left, beside_first, gain
 from .linear import FEW
 from .model import LISTED, SETTINGS, WORDS, Block, Parameter, Unit, Variant
 from .search import Search
@@ -35,7 +35,7 @@ class Described:
     word: str
     equation: str
     driver: int
-    shape: tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation, unit
+    shape: Known
     scale: float  # of its coefficients
     among: float  # alternatives that the scan could have told from it
     seen: str = ""  # equation whose scan has found it, where it acts in several
@@ -77,6 +77,10 @@ class Described:
         parameters = [Parameter(n, 0.0, 0.0, SPAN * self.scale) for n in each]
         return Unit(self.id, "form", (self.equation,), [Variant(parameters)], among=self.among, proposed=True)
 
+    def known(self, block: Block) -> np.ndarray | None:
+        """(row,) where a block says something of the form, or does not need to; None: everywhere."""
+        return function.within(block.coordinates, self.shape) if self.word == "function" else None
+
     def columns(self, block: Block) -> np.ndarray:
         """(column, row) of a block: the derivatives of its residual."""
         rows = FORMS[self.word].columns(block.coordinates, self.values)
@@ -96,6 +100,10 @@ class WithForms:
     def __getattr__(self, name: str):
         return getattr(self.machine, name)
 
+    def having(self, forms: Sequence[Described]) -> "WithForms":
+        """The same machine with other forms."""
+        return WithForms(self.machine, forms, self.known)
+
     def blocks(
         self, values: Mapping[str, float], name: str, disturbed: bool = False, wanted: Collection[str] | None = None
     ) -> list[Block]:
@@ -107,6 +115,9 @@ class WithForms:
             for form in self.forms:
                 if not form.channel and form.equation != block.equation:
                     continue
+                known = form.known(block)
+                if known is not None:
+                    block.usable = block.usable & known
                 names = form.names(block.recording)
                 here = np.array([values.get(n, 0.0) for n in names])
                 if not here.any() and wanted is not None and not set(names) & set(wanted):

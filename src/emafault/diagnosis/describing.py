@@ -1,8 +1,12 @@
 """Recordings whose equations are looked through for what no catalogue lists."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from .described import Described, proposed, refined, with_forms
+from .forms import function
 from .model import LISTED
 from .search import NEAR, Search
 from .sets import Model
@@ -21,6 +25,7 @@ class Describing(Settling):
     def __init__(self, machine, recordings: Sequence[str], processes: int = 1):
         super().__init__(with_forms(machine, getattr(machine, "forms", ())), recordings, processes)
         self.scanned = FEWEST  # forms proposed by scans that a set may have
+        self._spans: dict[str, dict[tuple[str, str], tuple[float, float]]] = {}  # by recording, see ``_ranges``
 
     def describe(self, forms: Sequence[Described]) -> None:
         """Take described forms among the candidate causes."""
@@ -44,8 +49,34 @@ class Describing(Settling):
         parts = [(values, names, carried, free, mark, k, workers.count) for k in range(workers.count)]
         found = proposed(self.machine, [f for part in workers.map("scan", parts) for f in part])
         found = [f for f in found if not any(f.same(g) for g in self.described)]
-        self.describe([*self.described, *found])
+        self.describe([*self.described, *map(self._over_all, found)])
         return bool(found)
+
+    def _over_all(self, form: Described) -> Described:
+        """A function over the whole range of its coordinate, over that which all recordings have of it: beyond its ends
+        it would be constant. Its coefficients at the point are then those of the same function."""
+        if form.word != "function":
+            return form
+        wide = replace(form, shape=function.widened(form.shape, self._ranges(form.equation)))
+        names = form.names(self.recordings[0])
+        here = np.array([self.point.get(n, 0.0) for n in names])
+        if here.any():
+            self.point |= dict(zip(names, function.converted(here, form.values, wide.values).tolist(), strict=True))
+        return wide
+
+    def _ranges(self, equation: str) -> dict[str, tuple[float, float]]:
+        """Least and largest value, over all recordings, of what an equation's rows lie along."""
+        for name in self.recordings:
+            if name not in self._spans:
+                blocks = self.machine.blocks(self.values(), name, wanted=())
+                self._spans[name] = {
+                    (b.equation, n): (float(np.min(b.coordinates[n])), float(np.max(b.coordinates[n])))
+                    for b in blocks for n in function.COORDINATES if n in b.coordinates
+                }  # fmt: skip
+        ends = [self._spans[name] for name in self.recordings]
+        of = {n for e in ends for q, n in e if q == equation}
+        every = {n: [e[equation, n] for e in ends if (equation, n) in e] for n in of}
+        return {n: (min(low for low, _ in e), max(high for _, high in e)) for n, e in every.items()}
 
     def _free(self, units: Collection[str]) -> dict[str, tuple[float, float]]:
         """What is free beside a form: nuisances and parameters of some units, by name of a column."""

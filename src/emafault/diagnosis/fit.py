@@ -137,6 +137,7 @@ class Bench(Describing):
         self.on, self.sizes, self.closer = set(bench.on), dict(bench.sizes), dict(bench.closer)
         self.sound, self.leading, self.scanned = bench.sound, dict(bench.leading), bench.scanned
         self.carried |= fit.carried
+        self.describe([self._over_all(f) for f in self.described])
         # until they are fitted, what the others' fit leaves of further recordings is their noise
         as_left = Task(self.values(), (), frozenset(), full={}, corrected=False)
         self._each(as_left, [n for n in self.recordings if n not in fit.carried])

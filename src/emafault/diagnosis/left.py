@@ -14,6 +14,7 @@ from .whitening import Weights, substituted, substituted_back
 
 APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
 Shape = Mapping[str, float]
+Known = tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation and unit of a shape's numbers
 Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
 
 
@@ -21,11 +22,11 @@ Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
 class Found:
     """A form where a scan has it.
 
-    ``shape``: name, value, standard deviation and unit of what is not linear; ``evidence``: approximate log Bayes
-    factor at that shape; ``among``: how many shapes the scan could have told apart.
+    ``shape``: of what is not linear; ``evidence``: approximate log Bayes factor at that shape; ``among``: how many
+    shapes the scan could have told apart.
     """
 
-    shape: tuple[tuple[str, float, float, str], ...]
+    shape: Known
     evidence: float
     among: float
 

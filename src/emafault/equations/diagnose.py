@@ -125,7 +125,7 @@ def diagnose(
     units, observed = all_fit.search.units.values(), tuple(whole.observed())
     named = read(all_fit.models, units, observed).named
     wanders = wandering.log_odds(every, confirm)
-    explored = Explored(bench, fit, Ladder(every, confirm))
+    explored = Explored(bench, fit, Ladder(every, confirm, bench.described))
     models, held_out = held_to_account(every, all_fit, named, explored, wanders)
     all_fit = replace(all_fit, models=models)
     quality |= {n: seen(r, exclude, own.angle_timing) for n, r in recordings.items() if n not in quality}

@@ -102,7 +102,8 @@ def _curve(fault: Fault) -> Told:
     phase = at.partition("_")[2]
     full = f"{full_range(fault.actuator, fault.channel):g} {'V' if fault.channel == 'voltage' else 'A'}"
     which = f"the recorded {of_phase(fault.channel, phase)} {'has' if phase else 'have'}"
-    says = f"{which} a cubic nonlinearity, {100.0 * share:.2g} % too low at {full}"
+    side = "low" if share > 0.0 else "high"
+    says = f"{which} a cubic nonlinearity, {100.0 * abs(share):.2g} % too {side} at {full}"
     return Told(says, "sensor_curve", "current" if fault.channel == "current" else "time", names={at: "bend"})
 
 

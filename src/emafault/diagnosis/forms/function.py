@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import null_space
 
-from ..left import Found, Left, Shape, beside_first, gain, of_cells
+from ..left import Found, Known, Left, Shape, beside_first, gain, of_cells
 from ..model import Block
 
 AXIS = "coordinate"  # of its picture
@@ -149,3 +149,36 @@ def told(values: np.ndarray, shape: Shape) -> dict[str, float]:
 def position(coordinates: Mapping, shape: Shape, values: np.ndarray) -> np.ndarray:
     """(row,) the coordinate that the shape names."""
     return np.asarray(coordinates[_along(shape)])
+
+
+def within(coordinates: Mapping, shape: Known) -> np.ndarray | None:
+    """(row,) whether anything is known of a function over the whole range of its coordinate there: of recordings that
+    go beyond it, not everywhere. None of a part, beyond which it is constant."""
+    values = {n: v for n, v, _, _ in shape}
+    if _partial(shape):
+        return None
+    x = np.asarray(coordinates[_along(values)])
+    return (x >= values["from"]) & (x <= values["to"])
+
+
+def _partial(shape: Known) -> bool:
+    return any(sd > 0.0 for n, _, sd, _ in shape if n in ENDS)
+
+
+def widened(shape: Known, ranges: Mapping[str, tuple[float, float]]) -> Known:
+    """A shape over the whole range of its coordinate, over what that has in more recordings; a part as it is.
+
+    ``ranges`` : least and largest value of coordinates
+    """
+    values = {n: v for n, v, _, _ in shape}
+    if _partial(shape):
+        return shape
+    low, high = ranges[_along(values)]
+    ends = {"from": min(values["from"], low), "to": max(values["to"], high)}
+    return tuple((n, ends.get(n, v), sd, unit) for n, v, sd, unit in shape)
+
+
+def converted(coefficients: np.ndarray, before: Shape, after: Shape) -> np.ndarray:
+    """(coefficient,) of the same function where its shape has other ends."""
+    at_knots = coefficients @ _splines(before, np.linspace(after["from"], after["to"], KNOTS))
+    return np.linalg.lstsq(_values(after), at_knots)[0]
