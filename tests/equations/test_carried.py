@@ -279,10 +279,11 @@ def test_a_gain_is_told_beside_what_the_commutations_leave_but_not_beside_what_t
 
 
 def test_a_wave_lies_alike_in_both_directions():
-    """A row of the torque equation is between two intervals, a sample of the angle at an interval's end."""
+    """A row of the torque equation is between two intervals, a sample of an angle at an interval's end."""
     of_torque = Described("~o", "order", "torque", 0, (("order", 5.3, 0.0, "1"),), 1.0, 1.0)
     of_angle = Described("~o", "order", "sensor_angle", 0, (("order", 5.3, 0.0, "1"),), 1.0, 1.0, "position", "angle")
-    for form, size in ((of_torque, 0.01), (of_angle, 2e-3)):
+    of_output = Described("~o", "order", "position", 0, (("order", 5.3, 0.0, "1"),), 1.0, 1.0)
+    for form, size in ((of_torque, 0.01), (of_angle, 2e-3), (of_output, 1e-4)):
         names = form.names("a.nc")
         entry = of_form(form, {names[0]: (size, 0.0), names[1]: (0.0, 0.0)}, ["a.nc"], ACTUATOR)
         rows = []
@@ -302,6 +303,25 @@ def test_a_wave_lies_alike_in_both_directions():
             assert np.hypot(cosine, sine) == pytest.approx(size, rel=0.1)
             phases.append(np.arctan2(sine, cosine))
         assert np.abs(phases).max() < 0.02
+
+
+@pytest.mark.parametrize(("channel", "equation", "size"), [("angle", "torque", 5e-4), ("output", "position", 1e-4)])
+def test_a_hum_of_a_channel_that_is_sampled_has_its_phase(channel, equation, size):
+    form = Described("~h", "frequency", channel, 0, (("frequency", 60.0, 0.0, "Hz"),), 1.0, 1.0, "position", channel)
+    names = form.names("a.nc")
+    entry = of_form(form, {names[0]: (size, 0.0), names[1]: (0.0, 0.0)}, ["a.nc"], ACTUATOR)
+    check_unlisted([entry])
+    rows = []
+    for unlisted in ([entry], []):
+        machine = WithForms(machine_of({"a.nc": recorded(unlisted)}), [form])
+        off = {n: p.off for n, p in machine.parameters.items()}
+        block = next(b for b in machine.blocks(off, "a.nc") if b.equation == equation)
+        rows.append((block, np.column_stack([*(block.columns[n] for n in names), block.residual])))
+    clear = block.usable & rows[0][0].usable
+    left = (rows[0][1] - rows[1][1])[clear, 2]
+    cosine, sine = np.linalg.lstsq(rows[1][1][clear, :2], -left, rcond=None)[0]
+    assert np.hypot(cosine, sine) == pytest.approx(size, rel=0.1)
+    assert abs(np.arctan2(sine, cosine)) < 0.02
 
 
 COARSE = [

@@ -79,7 +79,7 @@ def coordinates_of(state: State, equation: str, functions: Mapping[str, Any]) ->
         "drivers": np.array(drivers_of(state, equation, functions)),
     }
     of = rows_of(state, equation)
-    kinds["averaged"] = AVERAGED.get(equation, 1)
+    kinds |= {"averaged": AVERAGED.get(equation, 1)} if AVERAGED.get(equation, 1) else at_ends(rec, rec.angle)
     if equation == "torque":
         # the measured acceleration keeps its coefficient: another inertia is another share of the net torque
         kinds["sizes"] = {2: SHARE * typical_torque(rec.actuator), 3: 0.0, 4: 0.0, 5: 0.0}
@@ -126,6 +126,13 @@ def drivers_of(state: State, equation: str, functions: Mapping[str, Any]) -> lis
     if equation == "commutation":  # the angle at which each phase is switched on
         out += list(commutation.by_angle_of_phase(state))
     return [*out, control.late(state)] if equation == "control" else out
+
+
+def at_ends(rec: Signals, angle: np.ndarray) -> dict[str, Any]:
+    """What samples lie along that are taken at an interval's end, where the others are means over it; ``angle`` : of
+    the rotor there (rad)."""
+    time = rec.time + 0.5 * rec.interval
+    return {"time": time, "angle": angle, "rotor_angle": np.mod(angle, 2.0 * np.pi), "averaged": 0}
 
 
 def rows_of(state: State, equation: str) -> Callable[[np.ndarray], np.ndarray] | None:

@@ -28,6 +28,7 @@ from .coordinates import (
     COEFFICIENTS,
     OWN_ALONG,
     OWN_OF_CONTROL,
+    at_ends,
     coordinates_of,
     drivers_of,
     functions_of,
@@ -287,8 +288,7 @@ class ReferenceActuator:
         return out
 
     def sampled(self, name: str, place: str, less: np.ndarray | None = None) -> dict[str, Any]:
-        """What the samples of a recording's channel lie along: those of an angle are taken at an interval's end, where
-        the others are means over it.
+        """What the samples of a recording's channel lie along: those of angles are no means.
 
         ``less`` : (sample,) what an angle has too much
         """
@@ -297,7 +297,7 @@ class ReferenceActuator:
         if place not in ("angle", "output"):
             return {**found, "averaged": 1}
         angle = rec.angle if place != "angle" or less is None or not len(less) else rec.angle - less
-        return {**found, "angle": angle, "rotor_angle": np.mod(angle, 2.0 * np.pi), "averaged": 0}
+        return found | at_ends(rec, angle)
 
     def _recording(self, values: Mapping[str, float], rec: Signals, wanted: Collection[str] | None) -> list[Block]:
         state = State(rec, Point(values, rec.name, wanted))
