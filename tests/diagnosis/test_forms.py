@@ -9,6 +9,7 @@ import pytest
 from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
 from emafault.diagnosis.forms import FORMS, function
 from emafault.diagnosis.forms.memory import columns
+from emafault.diagnosis.left import gain
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.wandering import log_odds
 from emafault.diagnosis.whitening import WANDERING, Weights, coloured, filtered
@@ -129,6 +130,14 @@ def test_a_function_may_be_one_over_a_part_of_the_range_and_nothing_on_a_side_of
 def test_ends_are_in_order_and_sizes_above_zero(word, shape, possible):
     form = Described("~x", word, "torque", 0, tuple((n, v, 1.0, "") for n, v in shape.items()), 1.0, 1.0)
     assert form.possible is possible
+
+
+def test_columns_that_no_row_tells_apart_explain_what_one_of_them_does():
+    """A part of a range that no row lies in has as many columns of a step."""
+    step = np.ones((3, 3))
+    one = gain(np.array([30.0]), np.array([[10.0]]))
+    alike = gain(np.full(3, 30.0), 10.0 * step + 1e-5 * np.triu(step, 1) + 1e-5 * np.tril(step, -1))
+    assert np.isfinite(alike) and alike == pytest.approx(one, abs=4.0)
 
 
 WHOLE = (("coordinate", 2.0, 0.0, ""), ("from", -0.02, 0.0, "rad"), ("to", 0.1, 0.0, "rad"), ("nothing", 0.0, 0.0, ""))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from emafault.equations.quality import seen, told
-from emafault.io.motion import calm_motion, slips
+from emafault.io.motion import calm_motion, slips, without_outliers
 from emafault.schema import check_unlisted
 
-from .conftest import in_steps, recorded
+from .conftest import NOISE, in_steps, recorded
 
 
 def test_what_a_range_cuts_off_is_clipped_and_neither_held_nor_a_spike():
@@ -115,3 +115,24 @@ def test_an_angle_that_goes_its_own_way_has_lost_no_counts(change):
 
 def test_a_filter_of_the_speed_loses_no_counts_of_the_angle():
     assert len(slips(recorded("step", effects={"speed_latency": {"tau": 2e-3}}))[0]) == 0
+
+
+@pytest.mark.parametrize("spike", [0.03, -0.05])
+def test_spikes_of_an_angle_that_turns_fast_are_found(spike):
+    """From one neighbour of a spike to the other it turns by more than the spike."""
+    plain = recorded("reversal")
+    fast = np.flatnonzero(np.abs(np.diff(plain.rotor_angle)) > 0.02)[20::40]
+    assert len(fast) > 10 and not len(without_outliers(plain.rotor_angle)[1])
+    angle = plain.rotor_angle.copy()
+    angle[fast] += spike
+    calm, rows = without_outliers(angle)
+    assert rows.tolist() == fast.tolist()
+    np.testing.assert_allclose(calm, plain.rotor_angle, atol=6.0 * NOISE.angle)
+
+
+def test_two_spikes_beside_each_other_are_no_lost_counts():
+    plain = recorded("reversal")
+    angle = plain.rotor_angle.copy()
+    angle[1500] += 0.0272
+    angle[1503] -= 0.0157
+    assert len(slips(replace(plain, rotor_angle=angle))[0]) == 0

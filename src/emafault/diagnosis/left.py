@@ -7,12 +7,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..compiled import compiled
-from .evidence import Definite
 from .linear import ROUNDING
 from .model import Block
 from .whitening import Weights, substituted, substituted_back
 
 APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
+ROUNDED = 10.0  # times the error that a negative power shows, for a column to be apart from others
 Shape = Mapping[str, float]
 Known = tuple[tuple[str, float, float, str], ...]  # name, value, standard deviation and unit of a shape's numbers
 Columns = Callable[[Block], np.ndarray]  # of a block -> (column, row)
@@ -239,7 +239,10 @@ def gain(g: np.ndarray, G: np.ndarray) -> float:
         return -np.inf
     unit = g[used] / scale[used]
     M = G[np.ix_(used, used)] / np.outer(scale[used], scale[used])
-    found = float(0.5 * unit @ Definite(M + 1e-6 * np.eye(len(M))).solve(unit))
+    # columns may be one and the same, as of a part of a range that no row lies in
+    power, along = np.linalg.eigh(M)
+    apart = power > max(APART, -ROUNDED * power[0])
+    found = float(0.5 * np.sum((along.T @ unit)[apart] ** 2 / power[apart]))
     return float(_less_width(np.array([found]), int(used.sum()))[0])
 
 

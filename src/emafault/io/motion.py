@@ -12,7 +12,7 @@ from .updates import across, updates
 MOTION = ("rotor_angle", "rotor_speed", "output_position")
 SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
 AROUND, NEAR = 9, 4  # samples on either side of one in which the angle may have lost counts, and those nearest
-STAYS = 0.5  # of a jump, that the means on either side of it may differ from it by
+STAYS = 0.5  # of a jump, that the medians on either side of it may differ from it by
 ROW = 1.5  # times the command's changes around, from which there is a row missing
 
 
@@ -40,7 +40,8 @@ def _calm(x: np.ndarray) -> np.ndarray:
 def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A signal of the motion (sample,) less spikes, with what their neighbours say there; and (spike,) their samples.
 
-    A spike stands out of a cubic through two samples on either side, by more than these differ and the motion bends.
+    A spike stands out of a cubic through two samples on either side, by more than these differ beyond what the motion goes
+    on by and than it bends.
     """
     out, rows = values.copy(), np.zeros(0, int)
     if len(values) < 8:
@@ -51,7 +52,8 @@ def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     scale = max(float(np.median(off)) / 0.6745, lattice_step(values))
     second = np.abs(np.diff(x, 2))
     bends = np.maximum(second[:-4], second[4:])  # of the three samples before, of those after
-    alone = off > 2.0 * np.maximum(bends, np.abs(x[4:-2] - x[2:-4]))
+    goes_on = (x[2:-4] - x[1:-5]) + (x[5:-1] - x[4:-2])  # by how much it would change over the two intervals around
+    alone = off > 2.0 * np.maximum(bends, np.abs(x[4:-2] - x[2:-4] - goes_on))
     if scale > 0.0:
         rows = 3 + np.flatnonzero((off > SPIKE * scale) & alone)
     out[rows] = between[rows - 3]
@@ -80,7 +82,8 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     for at in np.flatnonzero(found[AROUND:-AROUND]):
         around = beyond[at : at + beside]
         level = np.cumsum(around - (around.sum() - around[AROUND]) / (beside - 1))
-        size = level[AROUND : AROUND + NEAR].mean() - level[AROUND - NEAR : AROUND].mean()
+        # of a spike beside another, which is left, the one is in no median
+        size = np.median(level[AROUND : AROUND + NEAR]) - np.median(level[AROUND - NEAR : AROUND])
         row = int(at) + AROUND + 1
         repeats = bool(np.any(np.diff(angle[row - AROUND : row + AROUND]) == 0.0))
         stays = abs(size - around[AROUND]) < STAYS * abs(size)
