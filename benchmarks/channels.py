@@ -195,6 +195,16 @@ def with_hum_of_currents(r: Recording, n: int) -> Recording:
     return replace(r, phase_current=r.phase_current + wave, phase_current_end=r.phase_current_end + wave)
 
 
+def with_hum_of_the_angle(r: Recording, n: int) -> Recording:
+    """An angle with a wave of 50 Hz, whose phase is another in each recording."""
+    return replace(r, rotor_angle=r.rotor_angle + 5e-4 * np.sin(2.0 * np.pi * 50.0 * r.time + n))
+
+
+def along_itself(x: np.ndarray, n: int) -> np.ndarray:
+    """An output position with a wave of 60 urad about every 26 mrad of its own."""
+    return x + 6e-5 * np.sin(2.0 * np.pi * x / 0.0262 + 0.4)
+
+
 def losing_counts(x: np.ndarray, n: int) -> np.ndarray:
     """An angle whose encoder loses four of 4096 counts, at another time in each recording."""
     return x + 4.0 * 2.0 * np.pi / 4096 * (np.arange(len(x)) > 1000 + 700 * n)
@@ -277,6 +287,9 @@ CHANNELS = {
     "angle new in one sample of five": changed(rotor_angle=lambda x, n: held(x, 5)),
     "hum of the currents": Channel(itself=("frequency in sensor_current",) * 3, change=with_hum_of_currents),
     "angle that loses four counts of 4096": changed("step_change in sensor_angle", rotor_angle=losing_counts),
+    "hum of the angle": Channel(itself=("frequency in sensor_angle",), change=with_hum_of_the_angle),
+    "output with a wave along itself": changed("order in position", output_position=along_itself),
+    "angle with small spikes": changed("spikes in sensor_angle", rotor_angle=spiked(0.1)),
     "instants of the angle that scatter by 10 us": Channel(
         entry("angle", "clock", scatter=1e-5), ("clock in sensor_angle",)
     ),
@@ -302,6 +315,31 @@ CHANNELS = {
     ),
     "load for 0.15 s": Channel(
         entry("torque", "pulse", jump=0.03, time=0.2, until=0.35), ("step_change in torque",)
+    ),
+    "gust of the load": Channel(
+        (
+            "unlisted=[{place: torque, form: function, along: time, from: 0.15, to: 0.45, "
+            "values: [0.0, -0.007, -0.018, -0.018, -0.007, 0.0]}]",
+        ),
+        ("function in torque",),
+    ),
+    "load that stiffens with the cube": Channel(
+        (
+            "unlisted=[{place: torque, form: function, along: output_angle, from: -0.2, to: 0.2, "
+            "values: [0.96, 0.20736, 0.00768, -0.00768, -0.20736, -0.96]}]",
+        ),
+        ("function in torque",),
+    ),
+    "drag beyond a place of the travel": Channel(
+        (
+            "unlisted=[{place: drag, form: function, along: output_angle, from: 0.02, to: 0.0201, "
+            "values: [0.0, 0.003, 0.006, 0.009, 0.012, 0.015]}]",
+        ),
+        ("coefficient in torque",),
+    ),
+    "brake that drags off": Channel(
+        ("unlisted=[{place: drag, form: memory, source: decay, gain: 0.08, time_constant: 0.02}]",),
+        ("memory in torque",),
     ),
     "terminal loose for 0.1 s": Channel(
         entry("resistance_b", "pulse", jump=0.2, time=0.2, until=0.3), ("step_change in electrical_b",)

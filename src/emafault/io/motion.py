@@ -40,8 +40,8 @@ def _calm(x: np.ndarray) -> np.ndarray:
 def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A signal of the motion (sample,) less spikes, with what their neighbours say there; and (spike,) their samples.
 
-    A spike stands out of a cubic through two samples on either side, by more than these differ beyond what the motion goes
-    on by and than it bends.
+    A spike stands out of a cubic through two samples on either side, by more than these differ beyond what the motion
+    goes on by, and than it bends.
     """
     out, rows = values.copy(), np.zeros(0, int)
     if len(values) < 8:

@@ -126,7 +126,7 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     for _ in range(NEARER):
         for end in ENDS:
             tried = [{**shape, end: shape[end] + s} for s in width * np.arange(-2.0, 3.0)]
-            tried = [s for s in tried if s["to"] - s["from"] > width]
+            tried = [s for s in tried if s["to"] - s["from"] > width and low <= s["from"] and s["to"] <= high]
             at = values(tried)
             shape, value = tried[int(np.argmax(at))], max(at)
         width *= 0.5
