@@ -220,8 +220,8 @@ def scanned(
                 continue
             value, best, driver = -np.inf, list[Found](), 0
             for shape, roughly, d in sorted(coarse, key=lambda c: -c[1]):
-                # no shape near it is worth proposing, or better than that of another driver
-                if FINER * roughly + PRIOR - float(np.log(places)) < max(value, 0.0):
+                # no shape near it is worth proposing, or it explains less than another driver does once refined
+                if FINER * roughly + PRIOR < float(np.log(places)) or (best and roughly <= best[0].evidence):
                     break
                 fine = [(f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in form.fine(left, d, shape)]
                 most = max(v for v, _ in fine)

@@ -4,6 +4,7 @@ machine has; over a part it is nothing on one side of that. What goes with the c
 with the output angle nothing at its zero: no machine has a constant torque."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -59,6 +60,11 @@ def _splines(shape: Shape, x) -> np.ndarray:
     return np.ascontiguousarray(of(np.clip(x, knots[0], knots[-1])).T)
 
 
+def _stacked(shapes: Sequence[Shape], x: np.ndarray) -> np.ndarray:
+    """(coefficient of each shape, value) splines of several shapes."""
+    return np.vstack([_splines(shape, x) for shape in shapes])
+
+
 def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     """The coordinate along which most stands out, over all of its range or a part, a constant of the driver apart."""
     best: tuple[Shape, float] | None = None
@@ -71,15 +77,15 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
         if few or high - low < 1e-9:
             continue
         step = (high - low) / CELLS
+        parts = _parts(along, low, high)
+        shapes = [{"coordinate": float(number), "from": f, "to": t, "nothing": 0.0} for f, t in parts]
+        middle = low + step * (np.arange(CELLS) + 0.5)
+        splines = left.once(("function", along), partial(_stacked, shapes, middle))
 
         def cell(b: Block, along: str = along, low: float = low, step: float = step) -> np.ndarray:
             return ((np.asarray(b.coordinates[along]) - low) / step).astype(int)
 
-        cells = left.cells(cell, CELLS, driver)
-        parts = _parts(along, low, high)
-        shapes = [{"coordinate": float(number), "from": f, "to": t, "nothing": 0.0} for f, t in parts]
-        splines = [_splines(s, low + step * (np.arange(CELLS) + 0.5)) for s in shapes]
-        g, G = of_cells(np.vstack(splines), cells)
+        g, G = of_cells(splines, left.cells(cell, CELLS, driver))
         for n, shape in enumerate(shapes):
             mine = slice(n * len(COEFFICIENTS), (n + 1) * len(COEFFICIENTS))
             value = gain(g[mine], G[mine, mine]) - float(np.log(max(1, len(shapes) - 1) if n else 1))
