@@ -9,7 +9,7 @@ import pytest
 from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
 from emafault.diagnosis.forms import FORMS, function
 from emafault.diagnosis.forms.memory import columns
-from emafault.diagnosis.left import gain
+from emafault.diagnosis.left import Left, gain
 from emafault.diagnosis.model import Block
 from emafault.diagnosis.wandering import log_odds
 from emafault.diagnosis.whitening import WANDERING, Weights, coloured, filtered
@@ -120,6 +120,17 @@ def test_a_function_may_be_one_over_a_part_of_the_range_and_nothing_on_a_side_of
     machine = Machine("function", part, (0.5, 0.9, 1.1, 0.9, 0.6), 0)
     better = refined(WithForms(machine, [first]), first, machine.found, machine.carried, {}, {})
     assert better.values["from"] < better.values["to"]
+
+
+@pytest.mark.parametrize("part", [(0.5, 1.0 + 1e-12), (-1e-12, 0.5)])
+def test_ends_of_a_part_stay_within_the_range_whatever_rounding_makes_of_them(part):
+    machine = Machine()
+    left = Left("torque", machine.found, [machine.carried[n]["torque"] for n in NAMES])
+    low, high = (float(f(machine.found[0].coordinates["time"])) for f in (np.min, np.max))
+    ends = {end: low + share * (high - low) for end, share in zip(("from", "to"), part, strict=True)}
+    for found in function.fine(left, 0, {"coordinate": 3.0, **ends, "nothing": 0.0}):
+        shape = {n: v for n, v, _, _ in found.shape}
+        assert low - 1e-9 <= shape["from"] < shape["to"] <= high + 1e-9
 
 
 @pytest.mark.parametrize(("word", "shape", "possible"), [

@@ -131,8 +131,8 @@ def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     width, value = 0.25 * (shape["to"] - shape["from"]), -np.inf
     for _ in range(NEARER):
         for end in ENDS:
-            tried = [{**shape, end: shape[end] + s} for s in width * np.arange(-2.0, 3.0)]
-            tried = [s for s in tried if s["to"] - s["from"] > width and low <= s["from"] and s["to"] <= high]
+            ends = np.clip(shape[end] + width * np.arange(-2.0, 3.0), low, high)
+            tried = [s for s in ({**shape, end: float(e)} for e in ends) if s["to"] - s["from"] > width]
             at = values(tried)
             shape, value = tried[int(np.argmax(at))], max(at)
         width *= 0.5
