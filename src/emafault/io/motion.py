@@ -40,8 +40,8 @@ def _calm(x: np.ndarray) -> np.ndarray:
 def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A signal of the motion (sample,) less spikes, with what their neighbours say there; and (spike,) their samples.
 
-    A spike stands out of a cubic through two samples on either side, by more than these differ beyond what the motion
-    goes on by, and than it bends.
+    A spike stands out of a cubic through two samples on either side, by more than twice what these differ by beyond
+    the local slope, and than twice the local curvature.
     """
     out, rows = values.copy(), np.zeros(0, int)
     if len(values) < 8:
@@ -52,8 +52,8 @@ def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     scale = max(float(np.median(off)) / 0.6745, lattice_step(values))
     second = np.abs(np.diff(x, 2))
     bends = np.maximum(second[:-4], second[4:])  # of the three samples before, of those after
-    goes_on = (x[2:-4] - x[1:-5]) + (x[5:-1] - x[4:-2])  # by how much it would change over the two intervals around
-    alone = off > 2.0 * np.maximum(bends, np.abs(x[4:-2] - x[2:-4] - goes_on))
+    slope = (x[2:-4] - x[1:-5]) + (x[5:-1] - x[4:-2])  # over two intervals, from those beside
+    alone = off > 2.0 * np.maximum(bends, np.abs(x[4:-2] - x[2:-4] - slope))
     if scale > 0.0:
         rows = 3 + np.flatnonzero((off > SPIKE * scale) & alone)
     out[rows] = between[rows - 3]
