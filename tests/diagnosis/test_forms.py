@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
+from emafault.diagnosis.describing import Describing
 from emafault.diagnosis.forms import FORMS, function
 from emafault.diagnosis.forms.memory import columns
 from emafault.diagnosis.left import Left, gain
@@ -168,6 +169,15 @@ def test_over_more_recordings_a_function_is_the_same_over_their_range():
         np.testing.assert_allclose(is_now, was, atol=0.02 * np.ptp(was))
     part = tuple((n, v, 0.01 if n == "from" else 0.0, unit) for n, v, _, unit in WHOLE)
     assert function.widened(part, {"output_angle": (-0.05, 0.2)}) == part
+
+
+@pytest.mark.parametrize(("equation", "seen", "channel"), [("torque", "", ""), ("sensor_speed", "torque", "speed")])
+def test_a_function_goes_over_what_the_equation_that_showed_it_lies_along(equation, seen, channel):
+    form = Described("~f", "function", equation, 0, WHOLE, 1.0, 1.0, seen=seen, channel=channel)
+    machine = Machine()
+    wide = Describing(machine, list(NAMES))._over_all(form)
+    angle = np.concatenate([b.coordinates["output_angle"] for b in machine.found])
+    assert (wide.values["from"], wide.values["to"]) == (min(angle.min(), -0.02), max(angle.max(), 0.1))
 
 
 def test_rows_beyond_where_a_function_was_seen_say_nothing_of_it():
