@@ -81,3 +81,19 @@ def test_a_column_whose_products_underflow_says_nothing():
     correct(white, 0.1 * gram)
     normal = assemble([white], ["a", "b"], {})
     assert np.isfinite(normal.H).all() and np.isfinite(normal.g).all() and normal.H[1, 1] < 1e-300
+
+
+def test_the_misfit_is_the_same_whatever_columns_stand_beside_it():
+    """Two columns whose noise is taken for more than they have together: what makes their products a covariance again
+    had moved the misfit too, and a set linearised with many columns was compared with one of few."""
+    rng = np.random.default_rng(7)
+    noise = np.outer([1.0, -1.0, 0.0], [1.0, -1.0, 0.0]) * 0.8 * ROWS
+    x = rng.standard_normal((ROWS, 3))
+    x[:, 1] = x[:, 0] + 0.1 * x[:, 1]
+    white = White("one", "torque", ["a", "b"], x.T @ x, ROWS)
+    white.gram[:2, 2] += 40.0
+    white.gram[2, :2] += 40.0
+    misfit = white.misfit
+    correct(white, noise)
+    assert np.linalg.eigvalsh(white.gram[:2, :2]).min() > -1e-6 * ROWS
+    assert white.misfit == misfit

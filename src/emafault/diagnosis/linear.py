@@ -246,6 +246,7 @@ def correct(white: White, noise: np.ndarray) -> None:
     white.own = misfit - float(white.gram[-1, -1])
     white.gram[-1, -1] = misfit
     white.gram = _definite(white.gram)
+    white.gram[-1, -1] = misfit  # whatever columns there are, sets are compared by it
 
 
 def _definite(gram: np.ndarray) -> np.ndarray:
