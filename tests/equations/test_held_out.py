@@ -278,6 +278,17 @@ def test_what_one_equation_lacks_is_no_misfit_of_those_that_share_its_nuisances(
     assert held_out.misfits(found) == {"torque": 50.0, "electrical_a": -5.0, "position": 3.0, "bus": -2.0}
 
 
+def test_what_is_told_has_to_predict_not_what_the_search_had():
+    """Once an effect is held to account and not told, recordings are predicted without it."""
+    units = ("compliance", "inertia", "stribeck")
+    search = searching({u: Unit(u, "structural", ("torque",), []) for u in units})
+    explored = SimpleNamespace(fit=SimpleNamespace(models=[search.fit([(u, 0) for u in units[:2]])], search=search))
+    account = held_out._Account(explored, [])
+    assert account.of_what(search.fit([("compliance", 1)])).choices == (Choice("compliance", 0, 1.0),)
+    assert account.of_what(search.fit([("stribeck", 0)])).units == ("stribeck",)
+    assert account.of_what(search.fit([("~seen_by_all_alone", 0)])).units == ()
+
+
 @pytest.mark.parametrize(("own", "named"), [(-3.0, False), (9.0, True)])
 def test_beside_what_is_not_told_any_more_an_effect_is_compared_at_its_own_optimum(own, named):
     """The linear model's point is that of the set with all of it."""

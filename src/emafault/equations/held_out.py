@@ -35,7 +35,7 @@ class HeldOut:
     """The fit to the explored recordings, and what the others say of names.
 
     ``ratios``: log predictive ratio by effect and form; ``changes``: by effect, log odds that it has another size in
-    each recording; ``leading``: the explored recordings' set that others were compared within, less what is not told.
+    each recording; ``leading``: the explored recordings' set of what the likeliest set of all recordings has by then.
     """
 
     explored: Explored
@@ -112,7 +112,7 @@ def held_to_account(
         sets.add_without(effect, left, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
-    return models, HeldOut(explored, ratios, changes, account.leading)
+    return models, HeldOut(explored, ratios, changes, account.of_what(models[0]))
 
 
 def misfits(found: HeldOut) -> dict[str, float]:
@@ -292,6 +292,12 @@ class _Account:
             return model
         members = self.instead_of | {c.unit: c.variant for c in model.choices if c.unit not in self.gone}
         return self.search.fit(tuple(members.items()))
+
+    def of_what(self, told: Model) -> Model:
+        """The explored recordings' set of what a set of all recordings has, as far as they have columns of it."""
+        known = {c.unit: c.variant for c in self.leading.choices}
+        members = [(c.unit, known.get(c.unit, c.variant)) for c in told.choices]
+        return self.search.fit(tuple(m for m in members if m in self.search.candidates))
 
     @property
     def base(self) -> Model:
