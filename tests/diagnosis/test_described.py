@@ -136,7 +136,7 @@ def test_several_forms_are_one_remainder_unless_they_leave_none(monkeypatch, lef
     monkeypatch.setattr(bench, "_keep_likely", lambda _: None)
     monkeypatch.setattr(bench, "_renewed", lambda: ())
     monkeypatch.setattr(bench, "_until_still", lambda *_: ended)
-    monkeypatch.setattr(bench, "_with_none_to_leave", lambda *_: ended)
+    monkeypatch.setattr(bench, "_none_to_leave", lambda *_: ended)
     monkeypatch.setattr(bench, "_lacking", lambda _: left)
     found = bench._with_all_described(*"wns")
     more = 0 if left else MOST - FEWEST

@@ -115,14 +115,18 @@ class Bench(Describing):
             whites, normal, search = self._until_still(*self._renewed(), FIRST, False)
         if self.scanned == FEWEST:
             return fit
-        whites, normal, search = self._with_none_to_leave(*self._renewed())
-        if not self._lacking(search):
-            return whites, normal, search
+        fitted = self._until_still(*self._renewed(), ROUNDS)
+        if not self._lacking(fitted[2]):
+            fitted = self._none_to_leave(*fitted)
+        if not self._lacking(fitted[2]):
+            return fitted
         self._restore(begun)
         return fit
 
     def _with_none_to_leave(self, whites: list[White], normal: Normal) -> tuple[list[White], Normal, Search]:
-        whites, normal, search = self._until_still(whites, normal, ROUNDS)
+        return self._none_to_leave(*self._until_still(whites, normal, ROUNDS))
+
+    def _none_to_leave(self, whites: list[White], normal: Normal, search: Search) -> tuple[list[White], Normal, Search]:
         for _ in range(LEAVES):
             if not self._leave_out(search, normal):
                 break
@@ -277,19 +281,26 @@ class Bench(Describing):
         """Compare the leading set with those that lack one member, or have a listed effect in the place of a described
         form, each at its own optimum; whether one is better.
 
-        What the linear model says of them from a point far from theirs is replaced by what it says at their own.
+        What the linear model says of them from a point far from theirs is replaced by what it says at their own, where
+        what tells them apart is less than the linear model may be wrong by.
         """
         best = search.ranked()[0]
-        members = [u for u in best.units if not u.startswith("remainder:")]
-        if not members:
+        reach = max(LINEAR * (best.log_posterior - search.fit(()).log_posterior), NEAR)
+        lacking: dict[str, Model] = {}  # by the member that is left out
+        for unit in (u for u in best.units if not u.startswith("remainder:")):
+            less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
+            if best.log_posterior - less.log_posterior < reach:
+                lacking[unit] = less
+        instead = self._listed_instead(search, best, reach)
+        if not lacking and not instead:
             return False
         begun = self.here()
-        leading = self.settle(best, normal)
+        self.move(best, normal)
+        leading = self.settle(Model(best.choices))  # from its own columns, as the others
         top = leading.log_posterior
         better: Place | None = None
-        for unit in members:
+        for unit, less in lacking.items():
             self.go_to(begun)
-            less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
             self.move(less, normal)  # where the linear model has the set's optimum
             own = self.settle(Model(less.choices))
             error = best.log_posterior - less.log_posterior - (leading.log_posterior - own.log_posterior)
@@ -298,7 +309,7 @@ class Bench(Describing):
             less.log_posterior += error
             if own.log_posterior > top:
                 top, better = own.log_posterior, self.here()
-        for listed in self._listed_instead(search, best):
+        for listed in instead:
             self.go_to(begun)
             self.move(listed, normal)
             own = self.settle(Model(listed.choices))
@@ -335,11 +346,12 @@ class Bench(Describing):
                 if rival in other.units and unit not in other.units:
                     other.log_posterior += error
 
-    def _listed_instead(self, search: Search, best: Model) -> list[Model]:
+    def _listed_instead(self, search: Search, best: Model, reach: float) -> list[Model]:
         """A set with each of the likeliest listed effects in the place of each of its described forms.
 
         A far optimum may look from here less like the effect that it is than like a form. In the place of one that no
-        scan has proposed, that is so of effects by secants alone, as far as they explain something there.
+        scan has proposed, that is so of effects by secants alone, as far as they explain something there. ``reach``:
+        log evidence that the linear model may be wrong by, of an effect that is none by a secant.
         """
         out = []
         proposed = {f.id for f in self.described}
@@ -358,7 +370,10 @@ class Bench(Describing):
                     found, effect = search.fit(members), members[-1][0]
                     if found.log_posterior > (likeliest[effect].log_posterior if effect in likeliest else least):
                         likeliest[effect] = found
-            out += sorted(likeliest.values(), key=lambda m: -m.log_posterior)[:SINGLES]
+            near = [
+                m for u, m in likeliest.items() if self._by_secant(u) or best.log_posterior - m.log_posterior < reach
+            ]
+            out += sorted(near, key=lambda m: -m.log_posterior)[:SINGLES]
         return out
 
     def _by_secant(self, unit: str) -> bool:
