@@ -63,13 +63,14 @@ class Channel:
     """What a bench's channels or controller are like.
 
     ``itself``: form and equation that it is told as; ``listed``: what it is of the catalogue; ``change``: of a
-    recording and its number, after the simulation.
+    recording and its number, after the simulation; ``of``: overrides of a recording's own, by its number.
     """
 
     overrides: tuple[str, ...] = ()
     itself: tuple[str, ...] = ()
     listed: tuple[str, ...] = ()
     change: Callable[[Recording, int], Recording] | None = None
+    of: Callable[[int], tuple[str, ...]] | None = None
 
 
 def changed(*itself: str, **of: Callable[[np.ndarray, int], np.ndarray]) -> Channel:
@@ -341,6 +342,13 @@ CHANNELS = {
         ("unlisted=[{place: drag, form: memory, source: decay, gain: 0.08, time_constant: 0.02}]",),
         ("memory in torque",),
     ),
+    "bus voltage by recording": changed("drift in bus", bus_voltage=lambda v, n: v + 0.8 * each(n)),
+    "bus voltage that drifts": changed(
+        "drift in bus", bus_voltage=lambda v, n: v + 0.3 * np.linspace(0.0, 1.0, len(v))
+    ),
+    "load by recording": Channel(
+        itself=("drift in torque",), of=lambda n: (f"effects.load_constant.T={2.0 * each(n)}",)
+    ),
     "terminal loose for 0.1 s": Channel(
         entry("resistance_b", "pulse", jump=0.2, time=0.2, until=0.3), ("step_change in electrical_b",)
     ),
@@ -383,7 +391,7 @@ def main() -> None:
                 folder = Path(scratch) / f"{channel} {effect}"
                 folder.mkdir()
                 this = CHANNELS[channel]
-                simulate_bench(folder, Case(6, 0.6, (*overrides, *this.overrides)))
+                simulate_bench(folder, Case(6, 0.6, (*overrides, *this.overrides), of=this.of))
                 for n, file in enumerate(sorted(folder.iterdir()) if this.change else ()):
                     write_recording(file, this.change(read_recording(file), n))
                 verdict = diagnose_bench(read_bench(folder, ActuatorParameters(**SPEC["actuator"])), SPEC).verdict

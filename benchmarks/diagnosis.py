@@ -15,6 +15,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,13 +35,15 @@ TICK = os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True)
 class Case:
-    """A bench to be simulated: number of recordings, their length (s), effects, commands, and whether it is healthy."""
+    """A bench to be simulated: number of recordings, their length (s), effects, commands, whether it is healthy, and
+    overrides of each recording's own by its number."""
 
     count: int
     length: float
     effects: tuple[str, ...] = ()
     commands: tuple[str, ...] = USUAL
     healthy: bool = False
+    of: Callable[[int], tuple[str, ...]] | None = None
 
 
 CASES = {
@@ -73,7 +76,8 @@ def simulate_bench(folder: Path, case: Case) -> int:
     samples = 0
     for n in range(case.count):
         changes = [f"command={case.commands[n % len(case.commands)]}", f"recording.duration={case.length}"]
-        composed = config.compose("paper", [*changes, "unit=tolerance", *case.effects])
+        own = case.of(n) if case.of else ()
+        composed = config.compose("paper", [*changes, "unit=tolerance", *case.effects, *own])
         spec = config.dataset_spec(composed, "fresh") | {"seed": n, "unit_seed": 1}
         seeded = 0.0 if case.healthy else 0.01
         fault = np.array([seeded, 0.0, 0.0, 0.0, seeded, TEMPERATURES[n % len(TEMPERATURES)] - 20.0])

@@ -179,6 +179,24 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
                 "recordings": {"one.nc": {"at_start": 0.1, "at_end": 0.3}, "two.nc": {"at_start": 0.1, "at_end": 0.5}},
             },
         ),
+        (
+            "~drift_bus_voltage",
+            {"offset_bus_voltage.all@one.nc": -0.5, "offset_bus_voltage.all@two.nc": 0.3},
+            {
+                "place": "bus_voltage", "form": "drift", "at_start": -0.1, "at_end": -0.1,
+                "recordings": {
+                    "one.nc": {"at_start": -0.5, "at_end": -0.5}, "two.nc": {"at_start": 0.3, "at_end": 0.3},
+                },
+            },
+        ),
+        (
+            "~load",
+            {"load.each@one.nc": 0.004, "load.each@two.nc": -0.002},
+            {
+                "place": "torque", "form": "pulse", "time": 0.0, "until": 2.0, "jump": -0.001,
+                "recordings": {"one.nc": {"jump": -0.004}, "two.nc": {"jump": 0.002}},
+            },
+        ),
         ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
         ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
         (

@@ -47,3 +47,17 @@ def test_counts_that_the_angle_has_lost_are_added():
     undone, what = corrected(found, {"a.nc": replace(plain, rotor_angle=angle)})
     assert what == ["counts that the angle's encoder has lost"]
     np.testing.assert_allclose(undone["a.nc"].rotor_angle, plain.rotor_angle, atol=5e-4)
+
+
+def test_a_bus_voltage_of_the_recording_s_own_is_undone():
+    plain = recorded("reversal")
+    bench = SimpleNamespace(described=(), machine=SimpleNamespace(actuator=ACTUATOR))
+    values = {"offset_bus_voltage.all@a.nc": 0.5, "drift_bus_voltage.all@a.nc": -0.2}
+    found = SimpleNamespace(verdict={"discovered": [{"unit": "~drift_bus_voltage"}]}, values=values, bench=bench)
+    share = (np.arange(len(plain.time)) + 0.5) / len(plain.time)
+    faulty = replace(plain, bus_voltage=plain.bus_voltage + 0.5 - 0.2 * share)
+    undone, what = corrected(found, {"a.nc": faulty})
+    assert what == ["drift of the bus voltage"]
+    np.testing.assert_allclose(undone["a.nc"].bus_voltage, plain.bus_voltage, atol=1e-12)
+    without = replace(plain, bus_voltage=None)
+    assert corrected(found, {"a.nc": without})[0]["a.nc"].bus_voltage is None

@@ -172,6 +172,34 @@ def test_white_with_a_winding_that_differs():
     assert both["torque"] < 1.2 < none["torque"]
 
 
+def test_white_with_a_load_and_a_bus_voltage_of_the_recording_s_own():
+    entries = (
+        {"place": "bus_voltage", "form": "drift", "at_start": 0.4, "at_end": 1.0},
+        {"place": "torque", "form": "pulse", "jump": -0.008, "time": 0.0, "until": 1.0},
+    )
+    recording = recorded("reversal", unlisted=entries)
+    machine = machine_of({"a.nc": recording})
+    own = {"offset_bus_voltage.all@a.nc": 0.4, "drift_bus_voltage.all@a.nc": 0.6, "load.each@a.nc": 0.008}
+    before, after = (mean_squares(machine, truth(machine, recording) | more) for more in ({}, own))
+    for equation in ("bus", "torque"):
+        assert 0.75 < after[equation] < 1.2 and before[equation] > 10.0, equation
+
+
+@pytest.mark.parametrize("beside", [{}, {"compliance": {"K": 5000.0, "C": 300.0}}])
+def test_a_load_of_the_recording_s_own_is_that_of_the_catalogue(beside):
+    recording = recorded("reversal", effects={"load_constant": {"T": 4.0}, **beside})
+    machine = machine_of({"a.nc": recording})
+    listed, own = (
+        {b.equation: b.residual for b in machine.blocks(values, "a.nc", wanted=())}
+        for values in (
+            truth(machine, recording, {"load_constant": {"T": 4.0}, **beside}),
+            truth(machine, recording, beside) | {"load.each@a.nc": 4.0 / machine.actuator.gear_ratio},
+        )
+    )
+    for equation, residual in listed.items():
+        np.testing.assert_allclose(own[equation], residual, atol=1e-9, err_msg=equation)
+
+
 def test_the_controller_sees_the_speed_as_its_sensor_makes_it():
     recording = recorded("reversal", effects={"speed_latency": {"tau": 2e-3}})
     machine = machine_of({"a.nc": recording})

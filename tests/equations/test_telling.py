@@ -151,3 +151,23 @@ def test_a_channel_that_drifts_alike_in_all_recordings_is_told_by_its_rate(value
     units = {"rate_voltage.c": "V/s", "offset_voltage.c": "V"}
     told = told_of_chain("~drift_voltage_c", "sensor_voltage", values, {n: units[n] for n in values}, ACTUATOR)
     assert told["sentence"] == f"In the measuring chain: the voltage channel of phase c {says}."
+
+
+@pytest.mark.parametrize(
+    ("unit", "equation", "values", "units", "says"),
+    [
+        (
+            "~drift_bus_voltage", "bus", {f"offset_bus_voltage.all@{n}.nc": (0.2 * n, 1e-3) for n in (-1, 2)}, "V",
+            "In the supply, or in the channel of its voltage: the offset of the bus voltage differs between recordings"
+            ", from -0.2 to 0.4 V.",
+        ),
+        (
+            "~load", "torque", {f"load.each@{n}.nc": (0.002 * n, 1e-5) for n in (-1, 2)}, "N m",
+            "In the torque equation: a constant load differs between recordings, from -0.002 to 0.004 N m at the rotor"
+            ".",
+        ),
+    ],
+)  # fmt: skip
+def test_what_recordings_have_of_their_own_is_told_where_it_acts(unit, equation, values, units, says):
+    told = told_of_chain(unit, equation, values, dict.fromkeys(values, units), ACTUATOR)
+    assert (told["sentence"], told["form"], told["equation"]) == (says, "drift", equation)

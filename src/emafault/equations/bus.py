@@ -5,7 +5,7 @@ that between two phases while the regulator never switches.
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from .acquisition import recorded_late
+from .acquisition import drifted, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .saturated import dropped, line_voltage, saturated
@@ -25,6 +25,7 @@ def residual(state: State) -> Dual:
         out = out - m.sag(state.p.of(effect_name(m)), rec, state.bus_current)
     if rec.bus is not None:
         out = recorded_late(state.p, "bus_voltage", out + np.zeros(rec.size), rec.size)
+        out = out + drifted(state.p, "bus_voltage", "all", rec)
     return measured(state) - out
 
 

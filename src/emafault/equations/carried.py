@@ -135,6 +135,12 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
         }
         place = channel if phase == "all" else f"{channel}_{phase}"
         return _rounded({"place": place, "form": "gain", **_means(gains), EACH: gains})
+    if kind == "load":
+        resisting = {full.partition("@")[2]: {"jump": -v} for full, (v, _) in linear.items()}
+        longest = max(lengths.values())
+        return _rounded(
+            {"place": "torque", "form": "pulse", "time": 0.0, "until": longest, **_means(resisting), EACH: resisting}
+        )
     if kind == "drift":
         if all("@" not in full for full in linear):
             alike = {full.partition("_")[0]: v for full, (v, _) in linear.items()}

@@ -84,10 +84,10 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
     share = (np.arange(size) + 0.5) / size
     if "~ambient" in told:
         yield "ambient temperature", partial(_warmer, by=values.get(f"ambient.start@{name}", 0.0))
-    for quantity in ("speed", "output"):
+    for quantity in ("speed", "output", "bus_voltage"):
         if f"~drift_{quantity}" in told:
             x = _drifted(values, quantity, "all", name, share, size * interval)
-            yield f"drift of the {quantity}", partial(_less, channel=quantity, x=x)
+            yield f"drift of the {quantity.replace('_', ' ')}", partial(_less, channel=quantity, x=x)
     if "~scale_output" in told:
         scale = 1.0 + sum(values.get(f"gain_output.{whose}", 0.0) for whose in SCALED)
         yield "scale of the output position", partial(_rescaled, scale=scale)
@@ -164,6 +164,9 @@ def _less(recording: Recording, channel: str, x: np.ndarray) -> Recording:
         return replace(recording, rotor_angle=recording.rotor_angle - x)
     if channel == "output":
         return replace(recording, output_position=recording.output_position - x)
+    if channel == "bus_voltage":
+        bus = recording.bus_voltage
+        return recording if bus is None else replace(recording, bus_voltage=bus - x)
     if channel == "voltage":
         return replace(recording, phase_voltage=recording.phase_voltage - x[:, None])
     quantity, phase = channel.split("_")

@@ -11,6 +11,7 @@ from ..effects import Effect
 from ..effects.scaling import scale
 from ..switches import TURN
 from . import acquisition, commutation, position
+from .coordinates import typical_torque
 from .point import SEEDED
 from .sensor_speed import SENSOR
 from .signals import REST, Signals
@@ -38,6 +39,7 @@ BEYOND = "~tolerance_"  # of the name of a form, before the effect whose quantit
 #: equations that a channel's faults show in, beside the one that is named after it
 IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",), "bus_voltage": ("bus",)}
 GAINED = ("current", "voltage", "output")  # quantities whose gain may be off
+LISTED_OFFSET = ("current", "bus_voltage")  # those of which an offset that stays is in the catalogue
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 OF_LAW = {**GAINS, "speed_limit": "rad/s"}  # what the control equation has of the controller
@@ -194,7 +196,7 @@ def measuring_chain(
         also = [turn] if kind == "drop" else []
         variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
         out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
-    return out + _drifts(recordings, reference)
+    return out + _drifts(a, recordings, reference)
 
 
 def _clocks(recordings: Collection[str]) -> list[Unit]:
@@ -224,17 +226,20 @@ def _shows(channel: str) -> tuple[str, ...]:
     return (f"sensor_{channel}", *IN.get(channel, ()))
 
 
-def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
+def _drifts(a: ActuatorParameters, recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
     """Channels whose offset grows, in all recordings alike or along each, or is another one in each, or whose gain is;
-    and a scale of the output position that is off.
+    and a scale of the output position that is off; a temperature and a load that are others in each recording.
 
-    A current's offset that is always the same is in the catalogue, and so is the speed's scale.
+    A current's offset that is always the same is in the catalogue, and so are the bus voltage's, a
+    constant load and the speed's scale.
     """
     out = []
     others = [n for n in recordings if n != reference]
     noise = next(iter(recordings.values())).noise
     longest = max(r.size * r.interval for r in recordings.values())
-    for quantity, units in (("current", "A"), ("voltage", "V"), ("speed", "rad/s"), ("output", "rad")):
+    quantities = {"current": "A", "voltage": "V", "speed": "rad/s", "output": "rad", "bus_voltage": "V"}
+    each_of = float(len(quantities) + 2)  # the machine's temperature and its load among them
+    for quantity, units in quantities.items():
         sd = FAR_OUT * float(getattr(noise, {"output": "position"}.get(quantity, quantity)))
         phases = PER_PHASE if quantity in ("current", "voltage") else ("all",)
         for j in phases:
@@ -246,10 +251,11 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
             )
             variants = [Variant(along), Variant(each), Variant([*each, *along]), Variant([rate])]
             unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
-            variants += [Variant([always]), Variant([always, rate])] if quantity != "current" else []
+            variants += [Variant([always]), Variant([always, rate])] if quantity not in LISTED_OFFSET else []
             # evenly over the quantities, then over a quantity's phases and its gain
-            among = 4.0 * (len(phases) + 1 if quantity in GAINED else 1)
-            out.append(Unit(unit, "form", _shows(quantity), variants, among=among))
+            among = each_of * (len(phases) + 1 if quantity in GAINED else 1)
+            shows = ("bus",) if quantity == "bus_voltage" else _shows(quantity)  # the supply's as well as its channel's
+            out.append(Unit(unit, "form", shows, variants, among=among))
         if len(phases) > 1 and others:
             # what all phases' gains have in common in all recordings is the unit's own calibration, but for their drift
             level, growth = acquisition.GAIN_NAMES
@@ -262,9 +268,11 @@ def _drifts(recordings: Mapping[str, Signals], reference: str) -> list[Unit]:
         if quantity == "output":
             scales = [Variant([Parameter(f"gain_output.{whose}", 0.0, 0.0, GAIN, "1")]) for whose in position.SCALED]
             out.append(Unit("~scale_output", "form", _shows(quantity), scales, among=among))
-    # evenly with the quantities: that the machine is warm of a motion before, or the thermometer elsewhere
+    # that the machine is warm of a motion before, or the thermometer elsewhere
     warm = [Parameter(f"ambient.start@{n}", 0.0, 0.0, WARM, "K") for n in recordings]
-    out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=4.0))
+    out.append(Unit("~ambient", "form", ("electrical",), [Variant(warm)], among=each_of))
+    loads = [Parameter(f"load.each@{n}", 0.0, 0.0, typical_torque(a), "N m") for n in recordings]
+    out.append(Unit("~load", "form", ("torque",), [Variant(loads)], among=each_of))
     return out
 
 

@@ -24,7 +24,9 @@ def fill(state: State) -> None:
     rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
     rec.play = _sum(state, "play")
     rec.ahead = _sum(state, "angle") + p.own("zero")
-    rec.load, rec.spring = _sum(state, "load"), _sum(state, "spring")
+    state.load = p(f"load.each@{rec.name}")
+    rec.load = _sum(state, "load") + state.load * rec.actuator.gear_ratio
+    rec.spring = _sum(state, "spring")
     rec.flexible = flexible(state)
     state.current, state.current_end, state.shown, state.lag = currents(rec, p)
     _angles(state)

@@ -2,7 +2,7 @@
 shape of the back-EMF, in words: one function a kind."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
@@ -145,6 +145,12 @@ def _ambient(fault: Fault) -> Told:
     return Told(f"at the start of the recordings the machine is {ends}", "drift", "temperature")
 
 
+def _load(fault: Fault) -> Told:
+    loads = fault.values.values()
+    ends = f"from {min(loads):z.2g} to {max(loads):z.2g} N m at the rotor"
+    return Told(f"a constant load differs between recordings, {ends}", "drift", where="In the torque equation")
+
+
 def _crosstalk(fault: Fault) -> Told:
     ((name, gain),) = fault.values.items()
     phases, what = name.rpartition(".")[2], fault.channel
@@ -153,17 +159,24 @@ def _crosstalk(fault: Fault) -> Told:
 
 
 def _drift(fault: Fault) -> Told:
+    whose, where = fault.whose, CHAIN
+    if fault.channel == "bus_voltage":
+        whose, where = CHANNELS[fault.channel], "In the supply, or in the channel of its voltage"
+    return replace(_drifted(fault, whose), where=where)
+
+
+def _drifted(fault: Fault, whose: str) -> Told:
     unit = next(iter(fault.units.values()))
     if all("@" not in n for n in fault.linear):
         says = {"offset": "has an offset of {:.2g} {}", RATE: "drifts by {:.2g} {}"}
         parts = [says[n.partition("_")[0]].format(v, fault.units[n]) for n, v in fault.values.items()]
-        return Told(f"the {fault.whose} {' and '.join(parts)}", "drift")
+        return Told(f"the {whose} {' and '.join(parts)}", "drift")
     starts = [v for n, v in fault.values.items() if n.startswith("offset")]
     if not starts:
-        return Told(f"the {fault.whose} drifts", "drift")
+        return Told(f"the {whose} drifts", "drift")
     ends = f"from {min(starts):z.2g} to {max(starts):z.2g} {unit}"
     also = ", and drifts within them" * (len(starts) < len(fault.linear))
-    return Told(f"the offset of the {fault.whose} differs between recordings, {ends}{also}", "drift")
+    return Told(f"the offset of the {whose} differs between recordings, {ends}{also}", "drift")
 
 
 def _gain(fault: Fault) -> Told:
@@ -213,5 +226,5 @@ KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "clock": _clock, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift,
     "gain": _gain, "scale": _scale, "harmonics": _harmonics,
     "coefficient": _coefficient,
-    "ambient": _ambient, "controller": _controller,
+    "ambient": _ambient, "load": _load, "controller": _controller,
 }  # fmt: skip

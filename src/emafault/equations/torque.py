@@ -26,8 +26,8 @@ def net_torque(state: State) -> Dual:
     for m in with_hook("viscous"):
         viscous = viscous * m.viscous(state.p.of(effect_name(m)))
     net = drive[0] + drive[1] + drive[2] - viscous * rec.speed - level * rec.direction
-    for m in with_hook("torque"):
-        load = m.torque(state.p.of(effect_name(m)), rec)
+    loads = [m.torque(state.p.of(effect_name(m)), rec) for m in with_hook("torque")]
+    for load in loads if rec.flexible else [*loads, state.load]:
         net = net - load
         state.shared = state.shared - np.asarray(load.value)
     return net

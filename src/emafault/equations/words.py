@@ -114,6 +114,7 @@ def _of_group(group: str, short: str) -> str:
     late = short.rpartition("_")[0]
     chain = {
         "ambient": "temperature at the start above the recorded ambient one",
+        "load": "constant load of its own, at the rotor",
         "skew": f"{short} channel is sampled late by",
         "clock": f"{short} is recorded late by",
         "clock_rate": f"{short} is recorded by a clock that is slow by",
@@ -130,7 +131,7 @@ def _of_group(group: str, short: str) -> str:
             f"{kind}_{q}": f"{kind.replace(RATE, 'rate of drift')} of the {CHANNELS.get(q, q)} channel"
             + f" of phase {short}" * (short != "all")
             for kind in ("drift", "offset", RATE)
-            for q in ("current", "voltage", "speed", "output")
+            for q in ("current", "voltage", "speed", "output", "bus_voltage")
         },
         "gain_output": f"gain of the output position, less one, of the {short}",
         **{
