@@ -5,12 +5,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from emafault.actuator.motor import AXIS
 from emafault.actuator.sensors import SensorNoise
 from emafault.diagnosis.linear import compressed_columns, correct, disturbance
 from emafault.diagnosis.whitening import whiten
 from emafault.effects import EFFECTS
 
-from .conftest import COMMANDS, NOISE, machine_of, recorded
+from .conftest import ACTUATOR, COMMANDS, NOISE, machine_of, recorded
 
 #: a clearly visible size of each effect, and the block of rows in which it shows
 SIZES = {
@@ -170,6 +171,36 @@ def test_white_with_a_winding_that_differs():
     none, back_emf, both = (mean_squares(machine, without | {n: of[n] for n in list(of)[:count]}) for count in range(3))
     assert both["electrical_b"] < 1.2 < 1.1 * back_emf["electrical_b"] < none["electrical_b"]
     assert both["torque"] < 1.2 < none["torque"]
+
+
+def test_a_rotor_that_is_salient_adds_the_change_of_its_flux_to_the_voltages():
+    """Of a recording whose voltages have it: L0 s cos(2 (p theta - alpha_j)) i_j, less what it was, over the interval;
+    the torque has its derivative by the angle, times half the square of the current."""
+    clean = replace(NOISE, **dict.fromkeys(vars(NOISE), 0.0))
+    plain, size, shift = recorded("sine", noise=clean), 0.04, 0.3
+    angles = ACTUATOR.pole_pairs * plain.rotor_angle[:, None] - AXIS
+    flux = ACTUATOR.inductance * size * np.cos(2.0 * angles - shift) * plain.phase_current_end
+    salient = replace(
+        plain, phase_voltage=plain.phase_voltage + np.diff(flux, axis=0, prepend=flux[:1]) / plain.interval
+    )
+    of = {"saliency.cos": size * np.cos(shift), "saliency.sin": size * np.sin(shift)}
+    found = []
+    for recording, more in ((plain, {}), (salient, of), (salient, {})):
+        machine = machine_of({"a.nc": recording})
+        blocks = machine.blocks(truth(machine, recording) | more, "a.nc", wanted=set(of))
+        found.append({b.equation: b for b in blocks})
+    before, after, without = found
+    for equation in ("electrical_a", "electrical_b", "electrical_c"):
+        of_rows = slice(2, None)
+        residuals = (x[equation].residual[of_rows] for x in (after, without))
+        off = [np.std(x - before[equation].residual[of_rows]) for x in residuals]
+        assert off[0] < 1e-3 * off[1], equation
+    torque = 0.5 * ACTUATOR.inductance * plain.phase_current**2 * -2.0 * ACTUATOR.pole_pairs * size
+    angles -= 0.5 * ACTUATOR.pole_pairs * plain.rotor_speed[:, None] * plain.interval
+    torque = np.sum(torque * np.sin(2.0 * angles - shift), axis=1)
+    torque[:-1] = 0.5 * (torque[:-1] + torque[1:])
+    added = (before["torque"].residual - after["torque"].residual)[2:-2]
+    assert np.std(added - torque[2:-2]) < 0.05 * np.std(torque)
 
 
 def test_white_with_a_load_and_a_bus_voltage_of_the_recording_s_own():

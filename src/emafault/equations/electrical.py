@@ -18,7 +18,7 @@ from .dual import Dual, Number, value_of
 from .point import State, effect_name
 from .signals import passing_time
 from .terms import with_hook
-from .windings import factor
+from .windings import factor, saliency
 
 RUN = 1e-3  # s, longest run of intervals that is averaged in motion
 RESTING = 5e-2  # s, at rest
@@ -40,6 +40,9 @@ def voltages(state: State) -> list[Dual]:
             flux = Dual(flux.value)
         for m in with_hook("flux"):
             flux = m.flux(state.p.of(effect_name(m)), flux)
+        by_angle, _ = saliency(state.p, rec, j)
+        if isinstance(by_angle, Dual):
+            flux = flux + flux * by_angle
         L: Dual | float = factor(state.p, "inductance", j) * a.inductance
         for m in with_hook("inductance"):
             L = L * m.inductance(state.p.of(effect_name(m)), rec, j)

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from ..actuator.parameters import ActuatorParameters
 from .acquisition import GAIN_NAMES, RATE, full_range
 from .sensor_speed import SENSOR
@@ -139,6 +141,13 @@ def _coefficient(fault: Fault) -> Told:
     return Told(says, "coefficient", "current", "In the electrical equation")
 
 
+def _saliency(fault: Fault) -> Told:
+    cosine, sine = fault.values.values()
+    size = float(np.hypot(cosine, sine))
+    says = f"the inductances go with the rotor's angle (saliency), by {100.0 * size:.2g} % twice per turn of the field"
+    return Told(says, "coefficient", "rotor_angle", "In the electrical equation")
+
+
 def _ambient(fault: Fault) -> Told:
     above = fault.values.values()
     ends = f"{min(above):z.2g} to {max(above):z.2g} K above the recorded ambient temperature"
@@ -225,6 +234,6 @@ def _clock(fault: Fault) -> Told:
 KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "clock": _clock, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift,
     "gain": _gain, "scale": _scale, "harmonics": _harmonics,
-    "coefficient": _coefficient,
+    "coefficient": _coefficient, "saliency": _saliency,
     "ambient": _ambient, "load": _load, "controller": _controller,
 }  # fmt: skip

@@ -11,6 +11,7 @@ from .dual import Dual, value_of
 from .point import State, effect_name
 from .signals import UNRESOLVED
 from .terms import with_hook
+from .windings import saliency
 
 
 def net_torque(state: State) -> Dual:
@@ -26,6 +27,11 @@ def net_torque(state: State) -> Dual:
     for m in with_hook("viscous"):
         viscous = viscous * m.viscous(state.p.of(effect_name(m)))
     net = drive[0] + drive[1] + drive[2] - viscous * rec.speed - level * rec.direction
+    for j in range(3):
+        _, slope = saliency(state.p, rec, j)
+        if isinstance(slope, Dual):
+            square = np.square(np.asarray(state.current[j].value)) * np.asarray(state.turns[j].value) ** 2
+            net = net + slope * (0.5 * a.inductance * square)
     loads = [m.torque(state.p.of(effect_name(m)), rec) for m in with_hook("torque")]
     for load in loads if rec.flexible else [*loads, state.load]:
         net = net - load

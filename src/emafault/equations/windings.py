@@ -1,9 +1,13 @@
-"""Coefficients of single phases that differ from what their turns make of those of all."""
+"""Coefficients of single phases that differ from what their turns make of those of all, and inductances that go with
+the rotor's angle."""
+
+import numpy as np
 
 from ..actuator.grammar import OF_WINDING, PHASES
 from ..diagnosis.model import Parameter, Unit, Variant
 from .dual import Dual
 from .point import Point
+from .signals import Signals
 
 UNIT = "~coefficient_winding"
 DIFFERS = 0.05  # relative, as widely as a phase's coefficient may
@@ -13,6 +17,27 @@ def factor(p: Point, name: str, j: int) -> Dual | float:
     """Factor of phase j's ``back_emf`` or ``inductance``."""
     share = p(f"winding.{name}_{PHASES[j]}")
     return 1.0 + share if share.slopes or share.value else 1.0
+
+
+def saliency(p: Point, rec: Signals, j: int) -> tuple[Dual | float, Dual | float]:
+    """(sample,) relative change of phase j's inductance at the intervals' ends, twice per turn of the field
+    (Krause 2013, Analysis of Electric Machinery and Drive Systems, section 1.5), and its derivative by the rotor's
+    angle (1/rad) in their middle."""
+    out: Dual | float = 0.0
+    slope: Dual | float = 0.0
+    poles = rec.actuator.pole_pairs
+    for name, wave, rate, sign in (("cos", np.cos, np.sin, -1.0), ("sin", np.sin, np.cos, 1.0)):
+        size = p(f"saliency.{name}")
+        if size.slopes or size.value:
+            end, middle = (2.0 * (poles * x - rec.axis[j]) for x in (rec.angle, rec.middle))
+            out, slope = out + size * wave(end), slope + size * (2.0 * sign * poles * rate(middle))
+    return out, slope
+
+
+def salient() -> Unit:
+    """Saliency of the rotor as a candidate cause."""
+    both = [Parameter(f"saliency.{n}", 0.0, 0.0, DIFFERS, "1") for n in ("cos", "sin")]
+    return Unit("~saliency", "form", ("electrical", "torque"), [Variant(both)])
 
 
 def unit() -> Unit:
