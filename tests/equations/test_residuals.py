@@ -203,6 +203,26 @@ def test_a_rotor_that_is_salient_adds_the_change_of_its_flux_to_the_voltages():
     assert np.std(added - torque[2:-2]) < 0.05 * np.std(torque)
 
 
+def test_inductances_between_phases_add_the_other_s_flux():
+    clean = replace(NOISE, **dict.fromkeys(vars(NOISE), 0.0))
+    plain = recorded("sine", noise=clean)
+    of = {"mutual.ab": 0.04, "mutual.bc": -0.02, "mutual.ca": 0.01}
+    shares = np.array([[0.0, 0.04, 0.01], [0.04, 0.0, -0.02], [0.01, -0.02, 0.0]])
+    flux = ACTUATOR.inductance * plain.phase_current_end @ shares
+    coupled = replace(
+        plain, phase_voltage=plain.phase_voltage + np.diff(flux, axis=0, prepend=flux[:1]) / plain.interval
+    )
+    residuals = []
+    for recording, more in ((plain, {}), (coupled, of), (coupled, {})):
+        machine = machine_of({"a.nc": recording})
+        blocks = machine.blocks(truth(machine, recording) | more, "a.nc", wanted=())
+        residuals.append({b.equation: b.residual[2:] for b in blocks})
+    before, after, without = residuals
+    for equation in ("electrical_a", "electrical_b", "electrical_c"):
+        off = [np.std(x[equation] - before[equation]) for x in (after, without)]
+        assert off[0] < 1e-3 * off[1], equation
+
+
 def test_white_with_a_load_and_a_bus_voltage_of_the_recording_s_own():
     entries = (
         {"place": "bus_voltage", "form": "drift", "at_start": 0.4, "at_end": 1.0},

@@ -167,6 +167,12 @@ def test_a_channel_that_drifts_alike_in_all_recordings_is_told_by_its_rate(value
             " the field.",
         ),
         (
+            "~mutual", "electrical",
+            {"mutual.ab": (0.05, 1e-3), "mutual.bc": (-0.01, 1e-3), "mutual.ca": (-0.01, 1e-3)}, "1",
+            "In the electrical equation: the inductances between phases differ from their mean, over that of one phase:"
+            " +4 % between a and b, -2 % between b and c, -2 % between c and a.",
+        ),
+        (
             "~load", "torque", {f"load.each@{n}.nc": (0.002 * n, 1e-5) for n in (-1, 2)}, "N m",
             "In the torque equation: a constant load differs between recordings, from -0.002 to 0.004 N m at the rotor"
             ".",
@@ -176,4 +182,4 @@ def test_a_channel_that_drifts_alike_in_all_recordings_is_told_by_its_rate(value
 def test_what_acts_in_an_equation_is_told_there(unit, equation, values, units, says):
     told = told_of_chain(unit, equation, values, dict.fromkeys(values, units), ACTUATOR)
     assert (told["sentence"], told["equation"]) == (says, equation)
-    assert told["form"] == ("coefficient" if unit == "~saliency" else "drift")
+    assert told["form"] == ("coefficient" if equation == "electrical" else "drift")

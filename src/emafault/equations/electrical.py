@@ -18,7 +18,7 @@ from .dual import Dual, Number, value_of
 from .point import State, effect_name
 from .signals import passing_time
 from .terms import with_hook
-from .windings import factor, saliency
+from .windings import MUTUAL, factor, saliency
 
 RUN = 1e-3  # s, longest run of intervals that is averaged in motion
 RESTING = 5e-2  # s, at rest
@@ -33,7 +33,7 @@ def voltages(state: State) -> list[Dual]:
     """Mean true voltage of each phase, terminal to star point, without that of the inductance (V)."""
     rec, a = state.rec, state.rec.actuator
     out = []
-    state.rise, state.inductance = [], []
+    state.rise, state.inductance, fluxes = [], [], []
     for j in range(3):
         flux = state.current_end[j]
         if rec.current_end is None:  # to the ripple, by which it is off, its own errors are nothing
@@ -48,15 +48,25 @@ def voltages(state: State) -> list[Dual]:
             L = L * m.inductance(state.p.of(effect_name(m)), rec, j)
         L = L * state.turns[j] * state.turns[j]
         state.inductance.append(float(value_of(L)))
-        rise = L * flux.linear(_difference, rec.size) * (1.0 / rec.interval)
-        if rec.current_end is None:
-            across = _runs(state, j).across
-            rise = Dual(rise.value, {n: np.where(across, s, 0.0) for n, s in rise.slopes.items()})
-        state.rise.append(rise)
+        fluxes.append(flux.linear(_difference, rec.size) * (a.inductance / rec.interval))
+        state.rise.append(fluxes[j] * (L * (1.0 / a.inductance)))
         back_emf = np.asarray(value_of(state.k[j] * state.swept[j]))
         by_calm = state.k[j] * state.regressor[j]
         out.append(state.resistance[j] * state.current[j] + Dual(back_emf, by_calm.slopes))
+    for name, (j, q) in MUTUAL.items():
+        share = state.p(name)
+        if share.slopes or share.value:
+            state.rise[j], state.rise[q] = state.rise[j] + share * fluxes[q], state.rise[q] + share * fluxes[j]
+    state.rise = [_known_rise(state, j, rise) for j, rise in enumerate(state.rise)]
     return out
+
+
+def _known_rise(state: State, j: int, rise: Dual) -> Dual:
+    """Without end currents the derivatives are known across commutations alone."""
+    if state.rec.current_end is not None:
+        return rise
+    across = _runs(state, j).across
+    return Dual(rise.value, {n: np.where(across, s, 0.0) for n, s in rise.slopes.items()})
 
 
 def _difference(x: np.ndarray) -> np.ndarray:

@@ -97,7 +97,7 @@ class ReferenceActuator:
             unit_of(e, actuator, self.parameters) for e in self.effects.values() if e.id != "speed_quantisation"
         ]
         self.units += [*measuring_chain(actuator, self.recordings, self.reference, exclude), *controller(actuator)]
-        self.units += [windings.unit(), windings.salient()]
+        self.units += [windings.unit(), windings.salient(), windings.mutual()]
         #: by effect, parameters that a form of its own may have: another shape of the back-EMF has other harmonics
         self.own_parameters: dict[str, tuple[str, ...]] = {}
         shapes = [m for m in map(effect_name, with_hook("harmonics")) if m in self.effects]

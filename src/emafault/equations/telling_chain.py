@@ -148,6 +148,13 @@ def _saliency(fault: Fault) -> Told:
     return Told(says, "coefficient", "rotor_angle", "In the electrical equation")
 
 
+def _mutual(fault: Fault) -> Told:
+    mean = sum(fault.values.values()) / len(fault.values)
+    sizes = [f"{100.0 * (v - mean):+.2g} % between {n[-2]} and {n[-1]}" for n, v in fault.values.items()]
+    says = "the inductances between phases differ from their mean, over that of one phase: " + ", ".join(sizes)
+    return Told(says, "coefficient", "current", "In the electrical equation")
+
+
 def _ambient(fault: Fault) -> Told:
     above = fault.values.values()
     ends = f"{min(above):z.2g} to {max(above):z.2g} K above the recorded ambient temperature"
@@ -234,6 +241,6 @@ def _clock(fault: Fault) -> Told:
 KINDS: dict[str, Callable[[Fault], Told]] = {
     "lag": _lag, "clock": _clock, "crosstalk": _crosstalk, "curve": _curve, "drop": _drop, "drift": _drift,
     "gain": _gain, "scale": _scale, "harmonics": _harmonics,
-    "coefficient": _coefficient, "saliency": _saliency,
+    "coefficient": _coefficient, "saliency": _saliency, "mutual": _mutual,
     "ambient": _ambient, "load": _load, "controller": _controller,
 }  # fmt: skip

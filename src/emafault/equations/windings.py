@@ -1,5 +1,5 @@
-"""Coefficients of single phases that differ from what their turns make of those of all, and inductances that go with
-the rotor's angle."""
+"""Coefficients of single phases that differ from what their turns make of those of all, inductances that go with the
+rotor's angle, and those between phases."""
 
 import numpy as np
 
@@ -10,7 +10,10 @@ from .point import Point
 from .signals import Signals
 
 UNIT = "~coefficient_winding"
+#: inductance between two phases, over that of one -> both
+MUTUAL = {f"mutual.{PHASES[j]}{PHASES[q]}": (j, q) for j, q in ((0, 1), (1, 2), (2, 0))}
 DIFFERS = 0.05  # relative, as widely as a phase's coefficient may
+WAYS = 3.0  # in which windings may differ: by coefficients of phases, with the angle, between phases
 
 
 def factor(p: Point, name: str, j: int) -> Dual | float:
@@ -37,7 +40,14 @@ def saliency(p: Point, rec: Signals, j: int) -> tuple[Dual | float, Dual | float
 def salient() -> Unit:
     """Saliency of the rotor as a candidate cause."""
     both = [Parameter(f"saliency.{n}", 0.0, 0.0, DIFFERS, "1") for n in ("cos", "sin")]
-    return Unit("~saliency", "form", ("electrical", "torque"), [Variant(both)])
+    return Unit("~saliency", "form", ("electrical", "torque"), [Variant(both)], among=WAYS)
+
+
+def mutual() -> Unit:
+    """Inductances between phases that differ from one another as a candidate cause; what all have alike is the phases'
+    own, for the currents add up to nothing."""
+    all_three = [Parameter(n, 0.0, 0.0, DIFFERS, "1") for n in MUTUAL]
+    return Unit("~mutual", "form", ("electrical",), [Variant(all_three)], among=WAYS)
 
 
 def unit() -> Unit:
@@ -47,4 +57,5 @@ def unit() -> Unit:
     """
     each = {n: Parameter(f"winding.{n}", 0.0, 0.0, DIFFERS, "1") for n in OF_WINDING["coefficient"]}
     unequal = Variant([p for n, p in each.items() if n.startswith("inductance")])
-    return Unit(UNIT, "form", ("electrical", "torque"), [*(Variant([p]) for p in each.values()), unequal])
+    variants = [*(Variant([p]) for p in each.values()), unequal]
+    return Unit(UNIT, "form", ("electrical", "torque"), variants, among=WAYS)

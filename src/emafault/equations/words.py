@@ -110,6 +110,8 @@ def _of_group(group: str, short: str) -> str:
         return f"harmonic of the back-EMF of order {short.removeprefix('h')}"
     if group == "saliency":
         return f"saliency, {'cosine' if short == 'cos' else 'sine'} of twice the electrical angle"
+    if group == "mutual":
+        return f"inductance between phases {short[0]} and {short[1]}, over that of one"
     if group == "winding":
         return f"{WINDING[short.rpartition('_')[0]]} of phase {short[-1]}, beside those of all phases"
     channel, _, side = short.partition("_")
