@@ -290,6 +290,7 @@ CHANNELS = {
     "angle that loses four counts of 4096": changed("step_change in sensor_angle", rotor_angle=losing_counts),
     "hum of the angle": Channel(itself=("frequency in sensor_angle",), change=with_hum_of_the_angle),
     "output with a wave along itself": changed("order in position", output_position=along_itself),
+    "output of a bent sensor": changed("function in position", output_position=lambda x, n: x + 0.4 * x**3),
     "angle with small spikes": changed("spikes in sensor_angle", rotor_angle=spiked(0.1)),
     "instants of the angle that scatter by 10 us": Channel(
         entry("angle", "clock", scatter=1e-5), ("clock in sensor_angle",)
