@@ -54,7 +54,7 @@ MISTAKEN = {
     "angle 60 electrical degrees off": lambda r: replace(r, rotor_angle=r.rotor_angle + np.pi / 6.0),
     "mV for V": lambda r: replace(r, phase_voltage=1e3 * r.phase_voltage),
     "rpm for rad/s": lambda r: replace(r, rotor_speed=r.rotor_speed * 30.0 / np.pi),
-    "angle that begins anew": lambda r: replace(r, rotor_angle=np.mod(r.rotor_angle, 2.0 * np.pi)),
+    "wrapped angle": lambda r: replace(r, rotor_angle=np.mod(r.rotor_angle, 2.0 * np.pi)),
 }
 
 
@@ -65,7 +65,7 @@ def test_identify_refuses_a_miswired_recording_in_one_line(folder, tmp_path, cap
     assert main(["identify", str(wrong), "--results", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert said.startswith("emafault identify: wrong.nc: ") and said.count("\n") == 1
-    assert ("jumps by a turn" in said) == (mistake == "angle that begins anew")
+    assert ("jumps by a turn" in said) == (mistake == "wrapped angle")
     assert main(["identify", str(folder / "faulty.nc"), "--reference", str(wrong), "--results", str(tmp_path)]) == 2
 
 

@@ -284,9 +284,9 @@ def test_what_is_told_has_to_predict_not_what_the_search_had():
     search = searching({u: Unit(u, "structural", ("torque",), []) for u in units})
     explored = SimpleNamespace(fit=SimpleNamespace(models=[search.fit([(u, 0) for u in units[:2]])], search=search))
     account = held_out._Account(explored, [])
-    assert account.of_what(search.fit([("compliance", 1)])).choices == (Choice("compliance", 0, 1.0),)
-    assert account.of_what(search.fit([("stribeck", 0)])).units == ("stribeck",)
-    assert account.of_what(search.fit([("~seen_by_all_alone", 0)])).units == ()
+    assert account.counterpart(search.fit([("compliance", 1)])).choices == (Choice("compliance", 0, 1.0),)
+    assert account.counterpart(search.fit([("stribeck", 0)])).units == ("stribeck",)
+    assert account.counterpart(search.fit([("~seen_by_all_alone", 0)])).units == ()
 
 
 @pytest.mark.parametrize(("own", "named"), [(-3.0, False), (9.0, True)])

@@ -47,6 +47,11 @@ class Described:
         return {n: v for n, v, _, _ in self.shape}
 
     @property
+    def shown(self) -> str:
+        """The equation whose rows it has been found along."""
+        return self.seen or self.equation
+
+    @property
     def possible(self) -> bool:
         """Whether its sizes are above zero and its ends in their order."""
         form, values = FORMS[self.word], self.values
@@ -370,13 +375,13 @@ def curve(
     coefficient; ``error``, their standard errors
     """
     module = FORMS[form.word]
-    own = [b for b in blocks if b.equation == (form.seen or form.equation)]
+    own = [b for b in blocks if b.equation == form.shown]
     along = {}
     for b in own:
         here = np.array([values.get(n, 0.0) for n in form.names(b.recording)])
         along[b.recording] = module.position(b.coordinates, form.values, here)
     both = [
-        Left(form.seen or form.equation, which, [carried[b.recording][b.equation] for b in own])
+        Left(form.shown, which, [carried[b.recording][b.equation] for b in own])
         for which in (without(machine, form, own, values), own)
     ]
     for bins in BINS:

@@ -57,7 +57,7 @@ class Describing(Settling):
         it would be constant. Its coefficients at the point are then those of the same function."""
         if form.word != "function":
             return form
-        wide = replace(form, shape=function.widened(form.shape, self._ranges(form.seen or form.equation)))
+        wide = replace(form, shape=function.widened(form.shape, self._ranges(form.shown)))
         names = form.names(self.recordings[0])
         here = np.array([self.point.get(n, 0.0) for n in names])
         if here.any():

@@ -115,11 +115,11 @@ class Bench(Describing):
             whites, normal, search = self._until_still(*self._renewed(), FIRST, False)
         if self.scanned == FEWEST:
             return fit
-        fitted = self._until_still(*self._renewed(), ROUNDS)
-        if not self._lacking(fitted[2]):
-            fitted = self._none_to_leave(*fitted)
-        if not self._lacking(fitted[2]):
-            return fitted
+        whites, normal, search = self._until_still(*self._renewed(), ROUNDS)
+        if not self._lacking(search):
+            whites, normal, search = self._none_to_leave(whites, normal, search)
+        if not self._lacking(search):
+            return whites, normal, search
         self._restore(begun)
         return fit
 

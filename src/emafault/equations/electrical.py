@@ -40,7 +40,7 @@ def voltages(state: State) -> list[Dual]:
             flux = Dual(flux.value)
         for m in with_hook("flux"):
             flux = m.flux(state.p.of(effect_name(m)), flux)
-        by_angle, _ = saliency(state.p, rec, j)
+        by_angle = saliency(state.p, rec, j)
         if isinstance(by_angle, Dual):
             flux = flux + flux * by_angle
         L: Dual | float = factor(state.p, "inductance", j) * a.inductance

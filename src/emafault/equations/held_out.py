@@ -112,7 +112,7 @@ def held_to_account(
         sets.add_without(effect, left, sets.log_mass(told) + other)
     _ask_forms(sets, account, ratios)  # those that only now would be told
     models = sorted(sets.models, key=lambda m: -m.log_posterior)
-    return models, HeldOut(explored, ratios, changes, account.of_what(models[0]))
+    return models, HeldOut(explored, ratios, changes, account.counterpart(models[0]))
 
 
 def misfits(found: HeldOut) -> dict[str, float]:
@@ -293,7 +293,7 @@ class _Account:
         members = self.instead_of | {c.unit: c.variant for c in model.choices if c.unit not in self.gone}
         return self.search.fit(tuple(members.items()))
 
-    def of_what(self, told: Model) -> Model:
+    def counterpart(self, told: Model) -> Model:
         """The explored recordings' set of what a set of all recordings has, as far as they have columns of it."""
         known = {c.unit: c.variant for c in self.leading.choices}
         members = [(c.unit, known.get(c.unit, c.variant)) for c in told.choices]

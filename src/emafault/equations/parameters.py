@@ -237,9 +237,8 @@ def _drifts(a: ActuatorParameters, recordings: Mapping[str, Signals], reference:
     others = [n for n in recordings if n != reference]
     noise = next(iter(recordings.values())).noise
     longest = max(r.size * r.interval for r in recordings.values())
-    quantities = {"current": "A", "voltage": "V", "speed": "rad/s", "output": "rad", "bus_voltage": "V"}
-    each_of = float(len(quantities) + 2)  # the machine's temperature and its load among them
-    for quantity, units in quantities.items():
+    each_of = float(len(acquisition.DRIFTS) + 2)  # the machine's temperature and its load among them
+    for quantity, units in acquisition.DRIFTS.items():
         sd = FAR_OUT * float(getattr(noise, {"output": "position"}.get(quantity, quantity)))
         phases = PER_PHASE if quantity in ("current", "voltage") else ("all",)
         for j in phases:

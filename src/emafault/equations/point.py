@@ -53,7 +53,7 @@ class State:
     Lists are by phase. ``shown`` mean currents that the sensors show (A), ``lag`` what the recorded ones are beyond
     those on time (A), ``swept`` mean of f w over each interval (rad/s), ``regressor`` the same of a smoothed angle,
     ``conducting`` mean of f over the part in which the phase is switched on, ``inductance`` (H), ``rise`` its voltage
-    (V), ``loss`` copper loss (W), ``bus_current`` (A), ``load`` of the recording's own at the rotor (N m), ``drive``
+    (V), ``loss`` copper loss (W), ``bus_current`` (A), ``own_load`` of the recording at the rotor (N m), ``drive``
     torque of the motor (N m), ``shared`` the same less that of loads (N m), ``net`` less friction as well, ``inertia``
     that turns with the rotor, over the nominal one.
     """
@@ -74,7 +74,7 @@ class State:
     loss: np.ndarray
     bus_current: np.ndarray
     drive: np.ndarray
-    load: Dual
+    own_load: Dual
     shared: np.ndarray
     net: np.ndarray
     inertia: float

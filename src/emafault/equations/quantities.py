@@ -24,8 +24,8 @@ def fill(state: State) -> None:
     rec.inertia_scale = scale if isinstance(scale, Dual) else Dual(scale)
     rec.play = _sum(state, "play")
     rec.ahead = _sum(state, "angle") + p.own("zero")
-    state.load = p(f"load.each@{rec.name}")
-    rec.load = _sum(state, "load") + state.load * rec.actuator.gear_ratio
+    state.own_load = p.own("load.each")
+    rec.load = _sum(state, "load") + state.own_load * rec.actuator.gear_ratio
     rec.spring = _sum(state, "spring")
     rec.flexible = flexible(state)
     state.current, state.current_end, state.shown, state.lag = currents(rec, p)

@@ -2,10 +2,9 @@
 shape of the back-EMF, in words: one function a kind."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from math import hypot
 from typing import Any
-
-import numpy as np
 
 from ..actuator.parameters import ActuatorParameters
 from .acquisition import GAIN_NAMES, RATE, full_range
@@ -28,6 +27,7 @@ CONTROLLER = {
 }
 WINDING = {"back_emf": "back-EMF coefficient", "inductance": "inductance"}
 CHAIN = "In the measuring chain"
+SUPPLY = "In the supply, or in the channel of its voltage"
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,7 @@ def _coefficient(fault: Fault) -> Told:
 
 
 def _saliency(fault: Fault) -> Told:
-    cosine, sine = fault.values.values()
-    size = float(np.hypot(cosine, sine))
+    size = hypot(*fault.values.values())
     says = f"the inductances go with the rotor's angle (saliency), by {100.0 * size:.2g} % twice per turn of the field"
     return Told(says, "coefficient", "rotor_angle", "In the electrical equation")
 
@@ -175,24 +174,23 @@ def _crosstalk(fault: Fault) -> Told:
 
 
 def _drift(fault: Fault) -> Told:
-    whose, where = fault.whose, CHAIN
     if fault.channel == "bus_voltage":
-        whose, where = CHANNELS[fault.channel], "In the supply, or in the channel of its voltage"
-    return replace(_drifted(fault, whose), where=where)
+        return Told(f"the {_drifts(fault, CHANNELS[fault.channel])}", "drift", where=SUPPLY)
+    return Told(f"the {_drifts(fault, fault.whose)}", "drift")
 
 
-def _drifted(fault: Fault, whose: str) -> Told:
+def _drifts(fault: Fault, whose: str) -> str:
     unit = next(iter(fault.units.values()))
     if all("@" not in n for n in fault.linear):
         says = {"offset": "has an offset of {:.2g} {}", RATE: "drifts by {:.2g} {}"}
         parts = [says[n.partition("_")[0]].format(v, fault.units[n]) for n, v in fault.values.items()]
-        return Told(f"the {whose} {' and '.join(parts)}", "drift")
+        return f"{whose} {' and '.join(parts)}"
     starts = [v for n, v in fault.values.items() if n.startswith("offset")]
     if not starts:
-        return Told(f"the {whose} drifts", "drift")
+        return f"{whose} drifts"
     ends = f"from {min(starts):z.2g} to {max(starts):z.2g} {unit}"
     also = ", and drifts within them" * (len(starts) < len(fault.linear))
-    return Told(f"the offset of the {whose} differs between recordings, {ends}{also}", "drift")
+    return f"offset of the {whose} differs between recordings, {ends}{also}"
 
 
 def _gain(fault: Fault) -> Told:

@@ -11,7 +11,7 @@ from .dual import Dual, value_of
 from .point import State, effect_name
 from .signals import UNRESOLVED
 from .terms import with_hook
-from .windings import saliency
+from .windings import saliency_slope
 
 
 def net_torque(state: State) -> Dual:
@@ -28,12 +28,12 @@ def net_torque(state: State) -> Dual:
         viscous = viscous * m.viscous(state.p.of(effect_name(m)))
     net = drive[0] + drive[1] + drive[2] - viscous * rec.speed - level * rec.direction
     for j in range(3):
-        _, slope = saliency(state.p, rec, j)
+        slope = saliency_slope(state.p, rec, j)
         if isinstance(slope, Dual):
             square = np.square(np.asarray(state.current[j].value)) * np.asarray(state.turns[j].value) ** 2
             net = net + slope * (0.5 * a.inductance * square)
     loads = [m.torque(state.p.of(effect_name(m)), rec) for m in with_hook("torque")]
-    for load in loads if rec.flexible else [*loads, state.load]:
+    for load in loads if rec.flexible else [*loads, state.own_load]:
         net = net - load
         state.shared = state.shared - np.asarray(load.value)
     return net

@@ -1,6 +1,8 @@
 """Coefficients of single phases that differ from what their turns make of those of all, inductances that go with the
 rotor's angle, and those between phases."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..actuator.grammar import OF_WINDING, PHASES
@@ -12,6 +14,7 @@ from .signals import Signals
 UNIT = "~coefficient_winding"
 #: inductance between two phases, over that of one -> both
 MUTUAL = {f"mutual.{PHASES[j]}{PHASES[q]}": (j, q) for j, q in ((0, 1), (1, 2), (2, 0))}
+Waves = tuple[Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]]
 DIFFERS = 0.05  # relative, as widely as a phase's coefficient may
 WAYS = 3.0  # in which windings may differ: by coefficients of phases, with the angle, between phases
 
@@ -22,19 +25,27 @@ def factor(p: Point, name: str, j: int) -> Dual | float:
     return 1.0 + share if share.slopes or share.value else 1.0
 
 
-def saliency(p: Point, rec: Signals, j: int) -> tuple[Dual | float, Dual | float]:
-    """(sample,) relative change of phase j's inductance at the intervals' ends, twice per turn of the field
-    (Krause 2013, Analysis of Electric Machinery and Drive Systems, section 1.5), and its derivative by the rotor's
-    angle (1/rad) in their middle."""
+def saliency(p: Point, rec: Signals, j: int) -> Dual | float:
+    """(sample,) relative change of phase j's self-inductance at the intervals' ends, twice per turn of the field
+    (Krause, Wasynczuk, Sudhoff and Pekarek 2013, Analysis of Electric Machinery and Drive Systems); inductances between
+    phases, which change likewise where windings are distributed as a sine, are taken as constant."""
+    return _twice(p, rec, j, rec.angle, (np.cos, np.sin))
+
+
+def saliency_slope(p: Point, rec: Signals, j: int) -> Dual | float:
+    """(sample,) its derivative by the rotor's angle (1/rad) in the middle of the intervals."""
+    per = 2.0 * rec.actuator.pole_pairs
+    return _twice(p, rec, j, rec.middle, (lambda x: -per * np.sin(x), lambda x: per * np.cos(x)))
+
+
+def _twice(p: Point, rec: Signals, j: int, angle: np.ndarray, waves: Waves) -> Dual | float:
+    """(sample,) two waves of twice the electrical angle of a phase, each of its size."""
     out: Dual | float = 0.0
-    slope: Dual | float = 0.0
-    poles = rec.actuator.pole_pairs
-    for name, wave, rate, sign in (("cos", np.cos, np.sin, -1.0), ("sin", np.sin, np.cos, 1.0)):
+    for name, wave in zip(("cos", "sin"), waves, strict=True):
         size = p(f"saliency.{name}")
         if size.slopes or size.value:
-            end, middle = (2.0 * (poles * x - rec.axis[j]) for x in (rec.angle, rec.middle))
-            out, slope = out + size * wave(end), slope + size * (2.0 * sign * poles * rate(middle))
-    return out, slope
+            out = out + size * wave(2.0 * (rec.actuator.pole_pairs * angle - rec.axis[j]))
+    return out
 
 
 def salient() -> Unit:

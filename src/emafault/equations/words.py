@@ -1,7 +1,7 @@
 """Fitted numbers of the reference actuator in words, as the table of a page has them; keys stay those of the model."""
 
 from ..diagnosis.described import Described
-from .acquisition import GAIN_NAMES, RATE
+from .acquisition import DRIFTS, GAIN_NAMES, RATE
 from .point import SEEDED
 from .telling import bare
 from .telling_chain import CHANNELS, LATE, WINDING, channel_in_words, of_phase
@@ -135,7 +135,7 @@ def _of_group(group: str, short: str) -> str:
             f"{kind}_{q}": f"{kind.replace(RATE, 'rate of drift')} of the {CHANNELS.get(q, q)} channel"
             + f" of phase {short}" * (short != "all")
             for kind in ("drift", "offset", RATE)
-            for q in ("current", "voltage", "speed", "output", "bus_voltage")
+            for q in DRIFTS
         },
         "gain_output": f"gain of the output position, less one, of the {short}",
         **{

@@ -31,7 +31,7 @@ FEWEST_SPIKES = 3  # in a recording
 LOST = 2 * np.pi / 3  # electrical rad from sample to sample; from here on a sample cannot be told its sector
 DRIFT = 3.0  # rad/s, below which a constant speed beside the rate of the angle is no mistake: coarse truncation has it
 BENT = 0.5  # rad of the angle beside a constant speed, from which a drift is told from a mistake
-WRAPPED = 0.1  # of a turn, that an angle which begins anew moves by from sample to sample at most
+WRAPPED = 0.1  # of a turn, that a wrapped angle moves by from sample to sample at most
 OF_SPEED, OF_GEAR = (0.4, 2.5), (0.85, 1.18)  # slopes with which signals that are one quantity may go together
 TEMPERATURES = (-100.0, 200.0)  # degC that an actuator may have at the start
 
@@ -171,14 +171,14 @@ def _refuse_unlike(
 
 
 def _refuse_wrapped(path: str, recording: Recording) -> None:
-    """Refuse an angle that begins anew at each turn."""
+    """Refuse an angle that is wrapped to one turn."""
     turned, turn = np.diff(recording.rotor_angle), 2.0 * np.pi
     beyond = turned - recording.interval * recording.rotor_speed[1:]
     jumps = np.abs(beyond) > 0.5 * turn
     if jumps.any() and np.all(np.abs(np.abs(turned[jumps]) - turn) < WRAPPED * turn):
         raise InputError(
-            f"{path}: rotor_angle jumps by a turn {jumps.sum()} times, as one does that begins anew at each; accepted "
-            "is one that goes on, as numpy.unwrap makes it"
+            f"{path}: rotor_angle jumps by a turn {jumps.sum()} times, it is wrapped; accepted is an unwrapped angle, "
+            "as numpy.unwrap gives it"
         )
 
 
