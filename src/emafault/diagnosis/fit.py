@@ -222,23 +222,37 @@ class Bench(Describing):
 
     def _search(self, normal: Normal, remainders: bool = True) -> Search:
         """Sets by the linear model; of a unit that may have no fault, under the prior that it has none where that is
-        sure enough to be named."""
-        found = {}
-        for sound in (False, True) if any(p.absent > 0.0 for p in self.parameters.values()) else (False,):
-            self.sound = sound
-            found[sound] = self._searched(normal, remainders)
-        if len(found) > 1:
+        sure enough to be named.
+
+        From the second time on, what leads under the prior of the last search is only looked at under the other, by
+        which is searched as well where that look is in its favour.
+        """
+        before = self.sound
+        found = {before: self._searched(normal, remainders)}
+        if not any(p.absent > 0.0 for p in self.parameters.values()):
+            return found[before]
+        for only in (found[before].leading(), None) if (not before) in self.leading else (None,):
+            self.sound = not before
+            found[not before] = self._searched(normal, remainders, only)
             odds = found[True].ranked()[0].log_posterior - found[False].ranked()[0].log_posterior
             self.sound = bool(expit(odds) >= NAMED)
+            if self.sound == before:
+                break
         return found[self.sound]
 
-    def _searched(self, normal: Normal, remainders: bool) -> Search:
+    def _searched(
+        self, normal: Normal, remainders: bool, only: Sequence[tuple[Choice, ...]] | None = None
+    ) -> Search:
+        """By the present prior; ``only``: sets that are looked at, no others."""
         reduced = self.reduce(normal)
         units, candidates = self.candidates(reduced)
         if not remainders:
             candidates = {m: c for m, c in candidates.items() if not m[0].startswith("remainder:")}
         closer = {u: c for u, c in self.closer.items() if u not in self.on}
         search = self.searching(reduced, units, candidates, closer, self.scanned)
+        if only is not None:
+            search.look(only)
+            return search
         search.run(self.leading.get(self.sound, ()))
         self.leading[self.sound] = search.leading()
         return search

@@ -1,6 +1,6 @@
 """The posterior over sets of listed effects, described forms and equations with a remainder."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -213,20 +213,24 @@ class Search:
     # ---- the search
     def run(self, begun: Sequence[tuple[Choice, ...]] = (), rounds: int = 8) -> list[Model]:
         """Every set looked at, most probable first; ``begun``: sets that led where this search goes on from."""
-        self.usual |= {m: c.width for choices in reversed(begun) for m, c in self._here(choices).items()}
-        every = [tuple(sorted(self._here(choices))) for choices in begun]
         causes = {m for m in self.candidates if self.units[m[0]].kind != "remainder"}
         # a remainder stands in for several causes at once, from which no single step leads back to them
         for among in (causes, set(self.candidates)):
-            for members in [(), *every]:
-                inside = tuple(m for m in members if m in among)
-                if self._may_be(inside):
-                    self.fit(inside)
+            self.look(begun, among)
             self._climb(rounds, among)
         # a unit in another form may take up what is another's, beside which its own form is the better again
         while self._complete():
             self._climb(rounds, set(self.candidates))
         return self.ranked()
+
+    def look(self, begun: Sequence[tuple[Choice, ...]], among: Collection[tuple[str, int]] | None = None) -> None:
+        """Fit the empty set and some others, what they have of some candidates or of all."""
+        self.usual |= {m: c.width for choices in reversed(begun) for m, c in self._here(choices).items()}
+        inside = set(self.candidates) if among is None else among
+        for members in [(), *(tuple(sorted(self._here(choices))) for choices in begun)]:
+            kept = tuple(m for m in members if m in inside)
+            if self._may_be(kept):
+                self.fit(kept)
 
     def leading(self) -> list[tuple[Choice, ...]]:
         """The likeliest sets, and the likeliest of those without a remainder: where a search may go on from."""

@@ -15,8 +15,7 @@ POSITIVE = ("order",)
 ENDS: tuple[str, ...] = ()
 CHANNELS: tuple[str, ...] = ("angle", "output")  # of the measuring chain that may have it
 COEFFICIENTS = ("cosine", "sine")
-CELLS = 64  # a turn
-HIGHEST = 24.0
+CELLS = 2.5  # of the shortest wave
 TURNS = 3.0  # fewest that show an order
 AROUND = 30.0  # lines whose level a line stands out of
 
@@ -36,18 +35,20 @@ def coarse(left: Left, driver: int) -> tuple[Shape, float] | None:
     first, turns = _span(left)
     if turns < TURNS:
         return None
-    cells = np.zeros(int(turns * CELLS) + 2)
+    highest = _highest(left)
+    per_turn = CELLS * highest
+    cells = np.zeros(int(turns * per_turn) + 2)
     for b, w in zip(left.blocks, left.remaining, strict=True):
-        at = ((np.asarray(b.coordinates["angle"]) - first) / (2.0 * np.pi) * CELLS).astype(int)
+        at = ((np.asarray(b.coordinates["angle"]) - first) / (2.0 * np.pi) * per_turn).astype(int)
         cells += np.bincount(at, w * b.coordinates["drivers"][driver], len(cells))
     size = 1 << int(np.ceil(np.log2(2 * len(cells))))
     power = np.abs(np.fft.rfft(cells, size)) ** 2
-    orders = np.arange(len(power)) * CELLS / size
+    orders = np.arange(len(power)) * per_turn / size
     ratio = above(power, 2 * int(AROUND * size / len(cells)) + 1)
-    highest = min(HIGHEST, *(b.coordinates.get("highest_order", HIGHEST) for b in left.blocks))
     ratio[(orders < 2.0 / turns) | (orders > highest)] = 0.0
     whole = np.arange(1.0, np.floor(highest) + 1.0)
-    tried = [float(orders[int(np.argmax(ratio))]), float(max(whole, key=lambda n: power[round(n * size / CELLS)]))]
+    most = max(whole, key=lambda n: power[round(n * size / per_turn)], default=1.0)
+    tried = [float(orders[int(np.argmax(ratio))]), float(most)]
     value, order = max(zip(_values(left, driver, tried), tried, strict=True))
     return {"order": order}, value
 
@@ -57,6 +58,13 @@ def _span(left: Left) -> tuple[float, float]:
     angles = [np.asarray(b.coordinates["angle"]) for b in left.blocks]
     first = min(a.min() for a in angles)
     return float(first), float((max(a.max() for a in angles) - first) / (2.0 * np.pi))
+
+
+def _highest(left: Left) -> float:
+    """The highest order whose waves rows show, two a wave on average over the way; lower where an equation says so."""
+    angles = [np.asarray(b.coordinates["angle"]) for b in left.blocks]
+    way = sum(float(np.abs(np.diff(a)).sum()) for a in angles)
+    return min(np.pi * sum(map(len, angles)) / way, *(b.coordinates.get("highest_order", np.inf) for b in left.blocks))
 
 
 def _values(left: Left, driver: int, orders: Sequence[float]) -> list[float]:
@@ -73,11 +81,12 @@ def _values(left: Left, driver: int, orders: Sequence[float]) -> list[float]:
 def fine(left: Left, driver: int, shape: Shape) -> list[Found]:
     """The order itself, and the whole number next to it: what turns with the rotor is as likely as all others."""
     _, turns = _span(left)
+    highest = _highest(left)
     order, deviation = refined(shape["order"], 0.5 / turns, lambda x: _values(left, driver, x))
-    tried = [((("order", order, deviation, "1"),), max(1.0, 2.0 * HIGHEST * turns))]
+    tried = [((("order", order, deviation, "1"),), max(1.0, 2.0 * highest * turns))]
     whole = float(np.round(order))
     if whole >= 1.0 and abs(order - whole) < 1.0 / turns:
-        tried.append(((("order", whole, 0.0, "1"),), 2.0 * HIGHEST))
+        tried.append(((("order", whole, 0.0, "1"),), 2.0 * highest))
     values = _values(left, driver, [s[0][1] for s, _ in tried])
     return [Found(s, value, among) for (s, among), value in zip(tried, values, strict=True)]
 
