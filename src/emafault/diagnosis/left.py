@@ -1,7 +1,7 @@
 """What one equation leaves in all recordings at a point, as the scans of described forms take it."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -9,7 +9,7 @@ from scipy.linalg import solve_triangular
 from ..compiled import compiled
 from .linear import ROUNDING
 from .model import Block
-from .whitening import Weights, substituted, substituted_back
+from .whitening import Weights, filtered, substituted, substituted_back
 
 APART = 1e-6  # of a column's information, that must be left of it once what is free is taken out
 ROUNDED = 10.0  # times the error that a negative power shows, for a column to be apart from others
@@ -51,18 +51,12 @@ class Left:
             self._white(k, np.asarray(b.residual, float)[:, None].copy())[:, 0] for k, b in enumerate(self.blocks)
         ]
         #: (row,) inverse covariance times what is left: its product with a column is the score of that column
-        self.weighed = [
-            substituted_back(f, b.usable, w / np.sqrt(o.variance))
-            for f, b, w, o in zip(self.factors, self.blocks, self.white, self.weights, strict=True)
-        ]
+        self.weighed = [self._back(k, white) for k, white in enumerate(self.white)]
         #: (row,) the same of ones: what a row says of a column that changes slowly
         self.known = [
-            np.maximum(substituted_back(f, b.usable, w / np.sqrt(o.variance)), 0.0)
-            for f, b, o, w in zip(
-                self.factors, self.blocks, self.weights,
-                [self._white(k, np.ones((len(b.residual), 1)))[:, 0] for k, b in enumerate(self.blocks)], strict=True,
-            )
-        ]  # fmt: skip
+            np.maximum(self._back(k, self._white(k, np.ones((len(b.residual), 1)))[:, 0]), 0.0)
+            for k, b in enumerate(self.blocks)
+        ]
         self._once: dict[Hashable, np.ndarray] = {}
         self._take_out(free or {})
 
@@ -90,10 +84,8 @@ class Left:
         self._exact, self._slow = _Free(exact, g), _Free(slow, g_slow)
         #: (row,) inverse covariance times what is left once what is free is fitted
         self.remaining = [
-            substituted_back(f, b.usable, (white - own @ self._exact.fitted[at]) / np.sqrt(o.variance))
-            for f, b, o, white, own, (at, _) in zip(
-                self.factors, self.blocks, self.weights, self.white, self.own_white, self.own, strict=True
-            )
+            self._back(k, white - own @ self._exact.fitted[at])
+            for k, (white, own, (at, _)) in enumerate(zip(self.white, self.own_white, self.own, strict=True))
         ]
         #: of each recording by itself
         self._alone = [
@@ -102,10 +94,25 @@ class Left:
         ]
 
     def _white(self, k: int, rows: np.ndarray) -> np.ndarray:
-        """(row, column) of a block divided by its noise, in place; rows not used become zero."""
+        """(row, column) of a block divided by its noise, in place or not; rows not used become zero.
+
+        The error of rounding comes back with what it is an error of, as in beats of counts with samples, and has the
+        colour that the weights say; that of other noise is as often of what is looked for.
+        """
         substituted(self.factors[k], self.blocks[k].usable, rows)
+        if self.blocks[k].rounded:
+            return filtered(rows, self.weights[k])
         rows *= (self.weights[k].usable / np.sqrt(self.weights[k].variance))[:, None]
         return rows
+
+    def _back(self, k: int, white: np.ndarray) -> np.ndarray:
+        """(row,) the same, transposed: inverse covariance times what ``white`` rows are of."""
+        weights = self.weights[k]
+        white = white / np.sqrt(weights.variance)
+        if self.blocks[k].rounded:
+            plain = replace(weights, usable=weights.usable[::-1], variance=np.ones(len(white)), wander=0.0)
+            white = filtered(white[::-1, None], plain)[::-1, 0]
+        return substituted_back(self.factors[k], self.blocks[k].usable, white)
 
     @property
     def drivers(self) -> int:

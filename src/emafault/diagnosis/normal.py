@@ -35,6 +35,7 @@ class NormalEquations(Point):
         self.remainders: dict[str, Unit] = {}
         self.instead: dict[str, float] = {}  # the point, had the last step added to factors and not multiplied them
         self.sizes: dict[str, dict[str, float]] = {}  # of the units that carry their own form
+        self.unreached = 0.0  # log evidence that the last step's linear model has where nuisances may not go
 
     def linearise(
         self,
@@ -188,9 +189,17 @@ class NormalEquations(Point):
         f, r = (np.array([normal.index[n] for n in of], int) for of in (names, rest))
         A = normal.H[np.ix_(f, f)] + np.diag(1.0 / sd**2)
         right = mean / sd**2 - normal.g[f] - normal.H[np.ix_(f, r)] @ d
+
+        def gain(x: np.ndarray) -> float:
+            return float(right @ x - 0.5 * x @ A @ x)
+
         found = minimum_within(A, right, low, high)
-        gained = float(right @ found - 0.5 * found @ A @ found)
-        return dict(zip(names, found.tolist(), strict=True)), gained - self.gained_beside(model, normal)
+        k = np.arange(len(names)) < len(self.nuisances)
+        self.unreached = 0.0
+        if np.any(k & ((found <= low) | (found >= high))):
+            anywhere = minimum_within(A, right, np.where(k, -np.inf, low), np.where(k, np.inf, high))
+            self.unreached = gain(anywhere) - gain(found)
+        return dict(zip(names, found.tolist(), strict=True)), gain(found) - self.gained_beside(model, normal)
 
     def _ends(self, model: Model, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """(column,) least and largest deviations that a step may take columns of a model to: what has one side of off

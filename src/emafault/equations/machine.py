@@ -54,6 +54,8 @@ OF_STATE = {
 }  # fmt: skip
 #: equation -> its channel, which may be slower than the recording
 OF_CHANNEL = {"sensor_speed": "speed", "position": "output", "bus": "bus"}
+#: equations in which the rounding of an encoder's counts is most of the noise
+OF_COUNTS = ("torque", "sensor_speed")
 FEWEST_EDGES = 20  # that a recording is asked about its commutations with
 RESISTANCE = 1  # driver of the electrical equations, the phase's current
 BACK_EMF = 2  # driver of the electrical equations, speed times the shape, and of the torque's, that of the motor
@@ -322,7 +324,9 @@ class ReferenceActuator:
     def _block(self, state: State, name: str, r: Dual, bands: list[np.ndarray], usable: np.ndarray) -> Block:
         columns = {**r.slopes, **self._secants(state, name, r, state.p.values)}
         along = self._coordinates(state, name)
-        rounded = (state.rec.output_step if name == "position" else state.rec.current_step) > 0.0
+        rec = state.rec
+        of_angle = rec.angle_step if name in OF_COUNTS else 0.0
+        rounded = (rec.output_step if name == "position" else max(rec.current_step, of_angle)) > 0.0
         filters = name == "sensor_speed"
         return Block(state.rec.name, name, np.asarray(r.value), columns, bands, usable, along, rounded, filters)
 

@@ -59,7 +59,8 @@ class Signals:
     zero_error: float = 0.0  # electrical rad, standard error of the angle's zero, where it was fitted to the voltages
     speed_step: float = 0.0  # rad/s, of a channel whose values lie on a lattice, as the next two
     current_step: float = 0.0  # A
-    output_step: float = 0.0  # rad, where it is more than the noise
+    output_step: float = 0.0  # rad, where it is more than the noise, as the next
+    angle_step: float = 0.0  # rad
     adds_up: bool = False  # whether the recorded currents add up to nothing by construction
     derived: int | None = None  # phase whose current is less the sum of the others, where it has no sensor
     #: (phase,) variance of each sensor's noise over the mean of all, of the currents and of those at intervals' ends
@@ -85,14 +86,14 @@ class Signals:
             spiked = np.zeros(len(r.time), bool)
             spiked[rows] = True
             lost |= binary_dilation(spiked)
-        counts = spacing(_of_new(r, "output", new))
+        counts, of_rotor = spacing(_of_new(r, "output", new)), spacing(r.rotor_angle)
         whole, step = adds_up(r), max(lattice_step(x) for x in r.phase_current.T)
         return cls(
             name, actuator, r.interval, r.phase_voltage, current, r.phase_current_end, r.rotor_speed,
             r.rotor_angle, r.output_position, r.commanded_position, r.bus_voltage, r.ambient_temperature, r.health,
             noise, lost, stood, float(r.known.get("rotor_angle", {}).get("zero_error", 0.0)),
             lattice_step(_of_new(r, "speed", new)),
-            step, counts if counts > noise.position else 0.0,
+            step, counts if counts > noise.position else 0.0, of_rotor if of_rotor > noise.angle else 0.0,
             whole, derived_phase([r]) if whole else None,
             (shares_of_noise([r]), shares_of_noise([r], end=True)) if step == 0.0 else (np.ones(3), np.ones(3)), new,
         )  # fmt: skip

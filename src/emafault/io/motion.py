@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
 
-from .lattice import lattice_step, spacing
+from .lattice import spacing
 from .recording import Recording
 from .updates import across, updates
 
@@ -49,7 +49,7 @@ def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x = values
     between = (4.0 * (x[2:-4] + x[4:-2]) - (x[1:-5] + x[5:-1])) / 6.0  # of samples 3 to -3
     off = np.abs(x[3:-3] - between)
-    scale = max(float(np.median(off)) / 0.6745, lattice_step(values))
+    scale = max(float(np.median(off)) / 0.6745, spacing(values) / np.sqrt(6.0))
     second = np.abs(np.diff(x, 2))
     bends = np.maximum(second[:-4], second[4:])  # of the three samples before, of those after
     slope = (x[2:-4] - x[1:-5]) + (x[5:-1] - x[4:-2])  # over two intervals, from those beside
