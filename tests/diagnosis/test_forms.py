@@ -75,6 +75,7 @@ class Machine:
 CASES = [
     ("order", {"order": 3.27}, (0.15, 0.1), 0),
     ("order", {"order": 2.0}, (0.15, 0.1), 1),
+    ("order", {"order": 78.0}, (0.15, 0.1), 0),  # of teeth
     ("order", {"order": 1.0}, (0.3, 0.2), 0),  # and no bump as wide as the turn
     ("frequency", {"frequency": 41.7}, (0.2, 0.1), 0),
     ("bump", {"centre": 2.1, "width": 0.25}, (0.4,), 0),
@@ -341,6 +342,18 @@ def test_noise_that_is_a_moving_average_does_not_wander(span):
     noise = np.random.default_rng(span).standard_normal(4000 + span - 1)
     weights = coloured(np.convolve(noise, np.ones(span), "valid") / np.sqrt(span), np.ones(4000, bool))
     assert weights.wander == 0.0 and max(weights.wandering[1:]) < 0.0
+
+
+def test_a_beat_of_counts_with_samples_is_the_colour_of_rounding_and_a_wave_where_nothing_is_rounded():
+    values = []
+    for rounded in (False, True):
+        machine = Machine("frequency", {"frequency": 700.0}, (1.2, 0.5))
+        for b in machine.found:
+            b.rounded = rounded
+            machine.carried[b.recording]["torque"] = coloured(np.asarray(b.residual), b.usable, False)
+        found = scanned(machine, machine.found, machine.carried, {}, "x")
+        values.append(max((v for v, d in found if d.word == "frequency"), default=0.0))
+    assert values[0] > 1000.0 and values[1] < 0.1 * values[0]
 
 
 def test_wandering_is_asked_of_all_recordings_together():

@@ -56,6 +56,26 @@ def test_a_cause_is_fitted_beside_what_is_held_at_the_end_of_its_prior():
     assert abs(bench.point["b"]) < 0.05 and abs(again.g[again.index["b"]]) < 0.01 * again.H[0, 0]
 
 
+def test_a_set_has_no_evidence_from_where_its_nuisances_may_not_go():
+    """The linear model has its optimum beyond: a cause that is missing had hardly told against the set without it."""
+
+    class WithOne(Machine):
+        parameters = {"a": Machine.parameters["a"]}  # noqa: RUF012
+
+        def blocks(self, values, recording, wanted=None, disturbed=False):
+            return super().blocks({**values, "b": -1.0}, recording)
+
+    def settled(reach):
+        bench = Bench(WithOne(), ["r"])
+        bench.reach = reach
+        found = bench.settle(NOTHING)
+        return found.log_posterior, bench._misfits(bench._fitted(NOTHING)[1], found, True)[0]
+
+    (held, misfit), (free, lowest) = settled(4.5), settled(10.0)
+    assert misfit - lowest > 300.0
+    assert free - held == pytest.approx(misfit - lowest, abs=1.0)
+
+
 def test_what_stands_beside_the_point_belongs_to_the_point_as_it_is():
     """A set's own optimum may lie elsewhere along what its own form makes up for: its own form there, beside the values
     here, had predicted nothing that was recorded."""

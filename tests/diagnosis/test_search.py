@@ -6,7 +6,7 @@ import pytest
 from emafault.diagnosis.evidence import Normal, marginalise
 from emafault.diagnosis.model import Parameter, Unit, Variant
 from emafault.diagnosis.search import Search
-from emafault.diagnosis.sets import Candidate
+from emafault.diagnosis.sets import Candidate, Choice
 
 ROWS = 4000
 CAUSES = 30
@@ -78,3 +78,15 @@ def test_what_an_own_form_takes_up_of_another_cause_is_given_back():
     alone = search.fit((("effect", 10),))
     assert 3.0 < best.log_posterior - alone.log_posterior < 30.0
     assert best.log_posterior - search.fit((("effect", 0),)).log_posterior > 100.0
+
+
+def test_a_look_at_some_sets_fits_these_alone_and_a_search_from_there_goes_on():
+    names = ["one", "two", "three"]
+    normal = Normal(names, 1e4 * np.eye(3), np.full(3, -1e4), 3e4)
+    reduced = marginalise(normal, [], np.zeros(0), np.zeros(0), np.zeros(3))
+    units = [Unit(n, "structural", ("torque",), [Variant([])]) for n in names]
+    candidates = {(n, 0): _candidate([k], 1.0, [n]) for k, n in enumerate(names)}
+    search = Search(reduced, units, candidates)
+    search.look([(Choice("one", 0, 1.0), Choice("three", 0, 1.0), Choice("gone", 0, 1.0))])
+    assert {m.units for m in search.ranked()} == {(), ("one", "three")}
+    assert search.run()[0].units == ("one", "three", "two")

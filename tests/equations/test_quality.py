@@ -130,6 +130,15 @@ def test_spikes_of_an_angle_that_turns_fast_are_found(spike):
     np.testing.assert_allclose(calm, plain.rotor_angle, atol=6.0 * NOISE.angle)
 
 
+@pytest.mark.parametrize("per_sample", [0.03, 4.98, 13.03])
+def test_counts_of_an_encoder_at_an_even_speed_are_no_spikes(per_sample):
+    """All differences but few are the same then, and a count more stands out of them."""
+    counts = np.floor(per_sample * np.arange(3000))
+    assert not len(without_outliers(1.534e-3 * counts)[1])
+    counts[1000] += 40.0
+    assert without_outliers(1.534e-3 * counts)[1].tolist() == [1000]
+
+
 def test_two_spikes_beside_each_other_are_no_lost_counts():
     plain = recorded("reversal")
     angle = plain.rotor_angle.copy()
