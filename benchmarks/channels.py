@@ -315,6 +315,14 @@ CHANNELS = {
         )),
         ("order in torque",) * 3,
     ),
+    "waves of 42 and of 41 a turn": Channel(
+        entries(
+            ("torque", "order", {"order": 42.0, "amplitude": 0.004, "phase": 0.3}),
+            ("torque", "order", {"order": 41.0, "amplitude": 0.0015, "phase": 1.0}),
+        ),
+        ("order in torque",) * 2,
+    ),
+    "encoder of 2000 counts": Channel(in_steps("angle", 3.142e-3)),
     "load for 0.15 s": Channel(
         entry("torque", "pulse", jump=0.03, time=0.2, until=0.35), ("step_change in torque",)
     ),

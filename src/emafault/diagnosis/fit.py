@@ -240,9 +240,7 @@ class Bench(Describing):
                 break
         return found[self.sound]
 
-    def _searched(
-        self, normal: Normal, remainders: bool, only: Sequence[tuple[Choice, ...]] | None = None
-    ) -> Search:
+    def _searched(self, normal: Normal, remainders: bool, only: Sequence[tuple[Choice, ...]] | None = None) -> Search:
         """By the present prior; ``only``: sets that are looked at, no others."""
         reduced = self.reduce(normal)
         units, candidates = self.candidates(reduced)
