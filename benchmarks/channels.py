@@ -322,7 +322,6 @@ CHANNELS = {
         ),
         ("order in torque",) * 2,
     ),
-    "encoder of 2000 counts": Channel(in_steps("angle", 3.142e-3)),
     "load for 0.15 s": Channel(
         entry("torque", "pulse", jump=0.03, time=0.2, until=0.35), ("step_change in torque",)
     ),
