@@ -94,7 +94,7 @@ class Left:
         ]
 
     def _white(self, k: int, rows: np.ndarray) -> np.ndarray:
-        """(row, column) of a block divided by its noise, in place or not; rows not used become zero.
+        """(row, column) of a block divided by its noise; overwrites ``rows``, and rows not used become zero.
 
         The error of rounding comes back with what it is an error of, as in beats of counts with samples, and has the
         colour that the weights say; that of other noise is as often of what is looked for.

@@ -112,7 +112,7 @@ class Settling(NormalEquations):
         if left > FAR and began is not None:  # what the last steps promised they have not held
             self.point = dict(began.point)
             found.log_posterior -= ahead
-        found.log_posterior -= self.unreached  # the optimum of a linear model that no point within the priors has
+        found.log_posterior -= self.unreached  # its optimum lies where no nuisance may go
         return found
 
     def at_its_own(self, model: Model, normal: Normal) -> Model:
