@@ -290,8 +290,8 @@ class Bench(Describing):
         return ahead
 
     def _leave_out(self, search: Search, normal: Normal) -> bool:
-        """Compare the leading set with those that lack one member, or have a listed effect in the place of a described
-        form, each at its own optimum; whether one is better.
+        """Compare the leading set with those that lack one member, have a listed effect in the place of a described
+        form, or are a listed effect alone in another form, each at its own optimum; whether one is better.
 
         What the linear model says of them from a point far from theirs is replaced by what it says at their own, where
         what tells them apart is less than the linear model may be wrong by.
@@ -303,7 +303,7 @@ class Bench(Describing):
             less = search.fit(tuple((c.unit, c.variant) for c in best.choices if c.unit != unit))
             if best.log_posterior - less.log_posterior < reach:
                 lacking[unit] = less
-        instead = self._listed_instead(search, best, reach)
+        instead = [*self._listed_instead(search, best, reach), *self._alone_in_another_form(search, best)]
         if not lacking and not instead:
             return False
         begun = self.here()
@@ -387,6 +387,22 @@ class Bench(Describing):
             ]
             out += sorted(near, key=lambda m: -m.log_posterior)[:SINGLES]
         return out
+
+    def _alone_in_another_form(self, search: Search, best: Model) -> list[Model]:
+        """The likeliest listed effects, each alone and in another form than the library's.
+
+        A large effect in another form looks from the library's like several causes together, and from where these have
+        taken the point that effect alone like nothing.
+        """
+        if len(best.units) < 2:
+            return []
+        alone: dict[str, Model] = {}
+        for m in search.candidates:
+            if self._kind(m[0]) in LISTED and m[1] >= OTHER_FORM:
+                found = search.fit((m,))
+                if m[0] not in alone or found.log_posterior > alone[m[0]].log_posterior:
+                    alone[m[0]] = found
+        return sorted(alone.values(), key=lambda m: -m.log_posterior)[:SINGLES]
 
     def _by_secant(self, unit: str) -> bool:
         return any(p.secant is not None for u in self.units if u.id == unit for p in u.parameters)
