@@ -240,6 +240,26 @@ def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder()
     assert "the controller sees it so" in told["sentence"]
 
 
+def test_an_angle_that_is_homed_anew_for_each_recording_is_told_and_undone():
+    """It had been a logger of the angle that is late by another amount in each, beside a remainder of the control."""
+    true, faulty = bench(COGGING), {}
+    zeros = dict(zip(true, (0.0, 0.01, -0.008, 0.004, -0.01, 0.006), strict=False))
+    for name, r in true.items():
+        faulty[name] = replace(r, rotor_angle=r.rotor_angle + zeros[name])
+    names = list(faulty)
+    found = diagnose("bench", faulty, (names[:3], names[3:]), ACTUATOR, NOISE)
+    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    (told,) = (d for d in found.verdict["discovered"] if d["equation"] != "control")
+    assert (told["unit"], told["form"], told["equation"]) == ("~drift_angle", "drift", "sensor_angle")
+    assert "the offset of the angle channel differs between recordings" in told["sentence"]
+    assert told["term"]["place"] == "angle"
+    undone, what = corrected(found, faulty)
+    assert what == ["drift of the angle"]
+    for name, r in undone.items():
+        # what they have in common is the angle's offset of the catalogue
+        assert np.mean(r.rotor_angle - true[name].rotor_angle) == pytest.approx(0.0, abs=5e-4)
+
+
 @pytest.mark.long
 def test_faults_of_three_channels_at_once_are_told_and_undone(tmp_path):
     """An offset of one current that is another in each recording, crosstalk of the voltages, an offset of the speed."""

@@ -236,6 +236,36 @@ def test_white_with_a_load_and_a_bus_voltage_of_the_recording_s_own():
         assert 0.75 < after[equation] < 1.2 and before[equation] > 10.0, equation
 
 
+def test_white_with_an_angle_whose_zero_drifts():
+    """As one that has slipped on its shaft; the same rate in all recordings is the same in each."""
+    recording = recorded("reversal", unlisted=({"place": "angle", "form": "drift", "at_start": 0.004, "at_end": 0.01},))
+    machine = machine_of({"a.nc": recording})
+    length = len(recording.time) * recording.interval
+    own = {"offset_angle.all@a.nc": 0.004, "drift_angle.all@a.nc": 0.006}
+    alike = own | {"drift_angle.all@a.nc": 0.0, "rate_angle.all": 0.006 / length}
+    before, *both = (mean_squares(machine, truth(machine, recording) | more) for more in ({}, own, alike))
+    for equation in ("electrical_a", "electrical_b", "electrical_c", "commutation"):
+        assert before[equation] > 1.5, equation
+        for after in both:
+            assert 0.75 < after[equation] < 1.2, equation
+
+
+def test_the_columns_of_a_drifting_angle_are_derivatives():
+    recording = recorded("reversal")
+    machine = machine_of({"a.nc": recording})
+    at = truth(machine, recording)
+    blocks = {b.equation: b for b in machine.blocks(at, "a.nc")}
+    for name, step in (("offset_angle.all@a.nc", 1e-4), ("drift_angle.all@a.nc", 1e-4), ("rate_angle.all", 1e-4)):
+        off = [
+            {b.equation: b.residual for b in machine.blocks(at | {name: x}, "a.nc", wanted=())} for x in (step, -step)
+        ]
+        for equation in ("electrical_b", "sensor_speed", "commutation", "position"):
+            wanted = (off[0][equation] - off[1][equation]) / (2.0 * step)
+            found = blocks[equation].columns[name]
+            size = max(np.std(wanted), np.mean(np.abs(wanted)))  # an offset does not show in all of them
+            assert np.std(found - wanted) < 0.1 * size + 1e-6, (name, equation)
+
+
 @pytest.mark.parametrize("beside", [{}, {"compliance": {"K": 5000.0, "C": 300.0}}])
 def test_a_load_of_the_recording_s_own_is_that_of_the_catalogue(beside):
     recording = recorded("reversal", effects={"load_constant": {"T": 4.0}, **beside})

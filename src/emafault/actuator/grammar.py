@@ -111,7 +111,7 @@ def forms_at(place: str) -> list[str]:
     phased = quantity in ("voltage", "current")
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased or quantity == "output",
-        "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "output", "bus"),
+        "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "angle", "output", "bus"),
         "clock": quantity in ("angle", "output", "speed"),
     }  # fmt: skip
     return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]

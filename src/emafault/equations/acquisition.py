@@ -26,7 +26,8 @@ OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
 GAIN_NAMES = ("gain", "gain_drift")
-DRIFTS = {"current": "A", "voltage": "V", "speed": "rad/s", "output": "rad", "bus_voltage": "V"}  # that have offsets
+#: quantities that have offsets
+DRIFTS = {"current": "A", "voltage": "V", "speed": "rad/s", "angle": "rad", "output": "rad", "bus_voltage": "V"}
 RATE = "rate"  # of a channel's offset, that grows with time in all recordings alike
 
 

@@ -84,7 +84,7 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
     share = (np.arange(size) + 0.5) / size
     if "~ambient" in told:
         yield "ambient temperature", partial(_warmer, by=values.get(f"ambient.start@{name}", 0.0))
-    for quantity in ("speed", "output", "bus_voltage"):
+    for quantity in ("speed", "angle", "output", "bus_voltage"):
         if f"~drift_{quantity}" in told:
             x = _drifted(values, quantity, "all", name, share, size * interval)
             yield f"drift of the {quantity.replace('_', ' ')}", partial(_less, channel=quantity, x=x)

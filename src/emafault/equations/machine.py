@@ -11,11 +11,11 @@ from ..diagnosis.model import SETTINGS, Block, Parameter, Unit
 from ..effects import Effect
 from ..effects.scaling import scaled
 from . import (
+    angle_error,
     bus,
     commutation,
     control,
     electrical,
-    late_angle,
     position,
     sensor_current,
     sensor_speed,
@@ -179,19 +179,19 @@ class ReferenceActuator:
         """
         self.prepare(name, values)
         rec = self._noisy(name) if disturbed else self.recordings[name]
-        late = [n for n in late_angle.names(name) if wanted is None or n in wanted]
+        of_angle = [n for n in angle_error.names(name) if wanted is None or n in wanted]
         less = dict(less or {})
-        ahead = late_angle.correction(values, name)
-        terms = late_angle.terms(self.recordings[name]) if late or ahead.any() else np.zeros((0, 0))
+        ahead = angle_error.correction(values, name, rec.time[-1])
+        terms = angle_error.terms(self.recordings[name]) if of_angle or ahead.any() else np.zeros((0, 0))
         if ahead.any():
             less["angle"] = less.get("angle", 0.0) - ahead @ terms
         blocks = self._recording(values, _less(rec, less), wanted)
-        if late:
-            self._add_late_angle(blocks, values, terms, late, less)
+        if of_angle:
+            self._add_angle_error(blocks, values, terms, of_angle, less)
         return blocks
 
     # ---- the measuring chain
-    def _add_late_angle(
+    def _add_angle_error(
         self,
         blocks: Sequence[Block],
         values: Mapping[str, float],
@@ -199,9 +199,9 @@ class ReferenceActuator:
         names: Sequence[str],
         less: Mapping[str, np.ndarray],
     ) -> None:
-        """Columns of what an angle is late by, of the ``terms`` of ``late_angle``, to blocks of a recording."""
+        """Columns of what an angle is late or off by, of the ``terms`` of ``angle_error``, to blocks of a recording."""
         name = blocks[0].recording
-        by_name = late_angle.derivatives(values, name)
+        by_name = angle_error.derivatives(values, name, self.recordings[name].time[-1])
         shares = np.array([by_name[n] for n in names])
         used = np.flatnonzero(shares.any(axis=0))
         if self.large and name not in self._late:

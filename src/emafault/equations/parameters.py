@@ -39,7 +39,7 @@ BEYOND = "~tolerance_"  # of the name of a form, before the effect whose quantit
 #: equations that a channel's faults show in, beside the one that is named after it
 IN = {"voltage": ("electrical",), "output": ("position",), "angle": ("sensor_speed",), "bus_voltage": ("bus",)}
 GAINED = ("current", "voltage", "output")  # quantities whose gain may be off
-LISTED_OFFSET = ("current", "bus_voltage")  # those of which an offset that stays is in the catalogue
+LISTED_OFFSET = ("current", "angle", "bus_voltage")  # those of which an offset that stays is in the catalogue
 #: gains of the controller with their units
 GAINS = {"position_gain": "1/s", "speed_gain": "A s/rad", "speed_integral_gain": "A/rad"}
 OF_LAW = {**GAINS, "speed_limit": "rad/s"}  # what the control equation has of the controller

@@ -187,7 +187,8 @@ def _drifts(fault: Fault, whose: str) -> str:
         return f"{whose} {' and '.join(parts)}"
     starts = [v for n, v in fault.values.items() if n.startswith("offset")]
     if not starts:
-        return f"{whose} drifts"
+        grows = [v for n, v in fault.values.items() if n.startswith("drift")]
+        return f"{whose} drifts along each recording, by {min(grows):z.2g} to {max(grows):z.2g} {unit}"
     ends = f"from {min(starts):z.2g} to {max(starts):z.2g} {unit}"
     also = ", and drifts within them" * (len(starts) < len(fault.linear))
     return f"offset of the {whose} differs between recordings, {ends}{also}"
