@@ -24,7 +24,7 @@ from emafault import config
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
-from emafault.io.recording import Recording, read_recording, write_recording
+from emafault.io.recording import VARIABLES, Recording, read_recording, write_recording
 from emafault.resampled import before
 
 EFFECTS = {
@@ -125,6 +125,24 @@ def standing_still(r: Recording, n: int) -> Recording:
     for x in out.values():
         x[at : at + 25] = x[at]
     return replace(r, **out)
+
+
+def of_rows(r: Recording, rows: np.ndarray) -> Recording:
+    """Some rows of a recording, whose time counts what is there."""
+    found = {name: x[rows] for name in VARIABLES if (x := getattr(r, name)) is not None}
+    return replace(r, **found | {"time": r.time[: len(rows)]})
+
+
+def with_missing_rows(r: Recording, n: int) -> Recording:
+    """A logger that has dropped five rows in each of two places."""
+    lost = [np.arange(at, at + 5) for at in np.random.default_rng(n).integers(200, len(r.time) - 200, 2)]
+    return of_rows(r, np.delete(np.arange(len(r.time)), np.concatenate(lost)))
+
+
+def with_rows_twice(r: Recording, n: int) -> Recording:
+    """A logger that has written one row of a hundred twice, and dropped the last ones for it."""
+    twice = np.random.default_rng(n).random(len(r.time)) < 0.01
+    return of_rows(r, np.repeat(np.arange(len(r.time)), 1 + twice)[: len(r.time)])
 
 
 def with_two_sensors(r: Recording, n: int) -> Recording:
@@ -274,6 +292,11 @@ CHANNELS = {
         itself=("held in sensor_current", "held in sensor_voltage", "held in bus", "held in position"),
         change=standing_still,
     ),
+    "ten rows missing": Channel(
+        itself=("held in sensor_current", "held in sensor_voltage", "held in bus", "held in position"),
+        change=with_missing_rows,
+    ),
+    "one row of a hundred twice": Channel(change=with_rows_twice),
     "two current sensors": Channel(change=with_two_sensors),
     "speed new in one sample of five": changed("held in sensor_speed", rotor_speed=lambda w, n: held(w, 5)),
     "output joined by lines over five": changed("held in position", output_position=lambda x, n: joined(x, 5)),

@@ -17,6 +17,7 @@ from ..places import kind, refuse_folder
 from .joined import joined
 from .motion import calm_motion
 from .recording import Recording, read_recording, recordings_in
+from .rows import filled, without_rows_twice
 from .sensors import refuse_mistaken, useless
 
 COARSE = np.pi / 6  # electrical rad from sample to sample: two samples in a commutation sector
@@ -80,6 +81,8 @@ def check_bench(
     warnings: list[dict] = []
     for n, recording in recordings.items():
         refuse_mistaken(shown[n], recording, actuator)
+        recording, twice = without_rows_twice(recording)
+        recording, missing = filled(recording)
         recording, period = joined(recording)
         copy = next((o for o, other in kept.items() if _same(recording, other)), None)
         found = (("time", f"holds the same data as {copy}"),) if copy else tuple(useless(recording, actuator))
@@ -88,6 +91,18 @@ def check_bench(
             warnings.append(_warning("set aside", f"{n}: {variable} {rule}; the recording is set aside", n, variable))
             continue
         kept[n] = recording
+        if twice:
+            message = (
+                f"{n}: {twice} rows repeat the one before in all channels while the rotor turns; they are left out"
+            )
+            warnings.append(_warning("samples", message, n, "time"))
+        if missing:
+            places = f"in {len(missing)} places" if len(missing) > 1 else "in one place"
+            message = (
+                f"{n}: {sum(missing.values())} rows are missing {places}, where angle and command go on by several "
+                "intervals; the row before is taken in their place, and left out"
+            )
+            warnings.append(_warning("samples", message, n, "time"))
         if period > 1:
             message = (
                 f"{n}: rotor_angle is new in one sample of {period} only; intervals are joined to "

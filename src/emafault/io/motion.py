@@ -1,6 +1,6 @@
 """Angle, speed and output position without what is no measurement: spikes, and the counts that an encoder has lost."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
@@ -11,7 +11,7 @@ from .updates import across, updates
 
 MOTION = ("rotor_angle", "rotor_speed", "output_position")
 SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
-AROUND, NEAR = 9, 4  # samples on either side of one in which the angle may have lost counts, and those nearest
+AROUND, NEAR = 9, 4  # samples on either side of one in which counts or time may be lost, and those nearest
 STAYS = 0.5  # of a jump, that the medians on either side of it may differ from it by
 ROW = 1.5  # times the command's changes around, from which there is a row missing
 
@@ -60,9 +60,24 @@ def without_outliers(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return out, rows
 
 
+@dataclass(frozen=True)
+class Jump:
+    """From ``row`` on the angle is off by ``size`` (rad) more than before; ``missing``: with the command as well."""
+
+    row: int
+    size: float
+    missing: bool
+
+
 def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Samples from which on the angle is off by more than before, as an encoder's that has lost counts, and by how much
-    (rad); (slip,) each, of a recording without spikes.
+    (rad); (slip,) each, of a recording without spikes."""
+    found = [j for j in jumps(recording) if not j.missing]
+    return np.array([j.row for j in found], int), np.array([j.size for j in found])
+
+
+def jumps(recording: Recording) -> list[Jump]:
+    """Where the angle of a recording without spikes is off by more than before.
 
     In that interval its change less the integrated speed stands out of those around it by more than these differ, and
     by more than any lag of either would make of how the speed changes there; and it stays. An angle that repeats
@@ -71,28 +86,26 @@ def slips(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     angle, speed, h = recording.rotor_angle, recording.rotor_speed[1:], recording.interval
     beside = 2 * AROUND + 1
     if len(angle) < 2 * beside or recording.known.get("rotor_angle", {}).get("source"):
-        return np.zeros(0, int), np.zeros(0)
+        return []
     beyond = np.diff(angle) - h * speed
     off = np.abs(beyond - median_filter(beyond, beside, mode="nearest"))
     scale = np.maximum(median_filter(off, beside, mode="nearest"), np.median(off)) / 0.6745
     changes = h * (maximum_filter1d(speed, beside) - minimum_filter1d(speed, beside))
     found = off > np.maximum(SPIKE * np.maximum(scale, spacing(angle) / np.sqrt(6.0)), changes)
     steps = np.abs(np.diff(recording.commanded_position))
-    rows, sizes = [], []
+    out = []
     for at in np.flatnonzero(found[AROUND:-AROUND]):
         around = beyond[at : at + beside]
         level = np.cumsum(around - (around.sum() - around[AROUND]) / (beside - 1))
         # of a spike beside another, which is left, the one is in no median
-        size = np.median(level[AROUND : AROUND + NEAR]) - np.median(level[AROUND - NEAR : AROUND])
+        size = float(np.median(level[AROUND : AROUND + NEAR]) - np.median(level[AROUND - NEAR : AROUND]))
         row = int(at) + AROUND + 1
         repeats = bool(np.any(np.diff(angle[row - AROUND : row + AROUND]) == 0.0))
         stays = abs(size - around[AROUND]) < STAYS * abs(size)
         commanded = steps[at : at + beside]
-        missing = commanded[AROUND] > ROW * np.delete(commanded, AROUND).max()
-        if stays and not repeats and not missing:
-            rows.append(row)
-            sizes.append(float(size))
-    return np.array(rows, int), np.array(sizes)
+        if stays and not repeats:
+            out.append(Jump(row, size, bool(commanded[AROUND] > ROW * np.delete(commanded, AROUND).max())))
+    return out
 
 
 def without_slips(angle: np.ndarray, rows: np.ndarray, sizes: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Signals that contradict each other or their sensors: what refuses a recording, and what makes one useless."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -11,7 +11,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .command import refuse_unfollowed
 from .lattice import lattice_step
-from .motion import MOTION, SPIKE, calm_motion
+from .motion import AROUND, MOTION, SPIKE, calm_motion
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
@@ -100,18 +100,36 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
 
 def stalled(recording: Recording) -> np.ndarray:
     """(sample,) bool: where the recorder stood still while the rotor turned: voltages, currents and angle repeat the
-    sample before to the last digit, and the angle then makes up for it."""
-    channels = (recording.phase_voltage, recording.phase_current, recording.rotor_angle[:, None])
-    same = np.append(False, np.all([(np.diff(x, axis=0) == 0.0).all(axis=1) for x in channels], axis=0))
-    out, angle, count = np.zeros(len(same), bool), recording.rotor_angle, len(same)
-    edges = np.flatnonzero(np.diff(same, append=False))
-    for before, last in edges.reshape(-1, 2):
-        length = last - before
-        beyond = min(last + 1 + length, count - 1)
-        if beyond > last + 1:
-            step = abs(angle[beyond] - angle[last + 1]) / (beyond - last - 1)
-            out[before + 1 : last + 1] = abs(angle[last + 1] - angle[last]) > 0.5 * step * (length + 1)
+    sample before to the last digit, and time went on, by the command or by the angle."""
+    out = np.zeros(len(recording.time), bool)
+    for before, last in repeats((recording.phase_voltage, recording.phase_current, recording.rotor_angle)):
+        command = went_on(recording.commanded_position, before, last)
+        out[before + 1 : last + 1] = command or (command is None and makes_up(recording.rotor_angle, before, last))
     return out
+
+
+def repeats(channels: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+    """The sample before and the last of each run of samples that repeat the one before in all channels."""
+    same = [(np.diff(x.reshape(len(x), -1), axis=0) == 0.0).all(axis=1) for x in channels]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.all(same, axis=0), [False]])))
+    return [(int(before), int(last)) for before, last in edges.reshape(-1, 2)]
+
+
+def went_on(command: np.ndarray, before: int, last: int) -> bool | None:
+    """Whether time went on from one sample to another by a command, which has no noise; None where it changes with few
+    samples around and does not tell."""
+    around = last - before + AROUND
+    inside = np.diff(command[before : last + 1])
+    beside = np.diff(command[max(0, before - around) : before + 1]), np.diff(command[last : last + around + 1])
+    if np.mean(np.concatenate(beside) != 0.0) <= 0.5:
+        return None
+    return bool(inside.any()) or makes_up(command, before, last)
+
+
+def makes_up(x: np.ndarray, before: int, last: int) -> bool:
+    """Whether a signal that has repeated samples up to the last makes up for them with the next."""
+    after = np.abs(np.diff(x[last + 1 : last + 1 + last - before + AROUND]))
+    return bool(len(after) and abs(x[last + 1] - x[last]) > (1.0 + 0.5 * (last - before)) * np.median(after))
 
 
 def held(recording: Recording) -> np.ndarray:
