@@ -572,3 +572,15 @@ def test_a_stribeck_friction_acts_with_the_speed_that_is_told(w_s):
     here, ahead, back = (of_torque(np.log(w_s) + x) for x in (0.0, 0.01, -0.01))
     moved, column = (ahead.residual - back.residual) / 0.02, here.columns["stribeck.log_w_s"]
     assert moved @ column / (column @ column) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("early", [0.0, 0.537])
+def test_a_speed_without_noise_of_its_own_has_a_covariance(early):
+    """What little is left out of that of a filtered rate of the angle had made its spectrum negative."""
+    recording = recorded("reversal")
+    machine = machine_of({"a.nc": recording})
+    signals = machine.recordings["a.nc"]
+    machine.recordings["a.nc"] = replace(signals, noise=replace(signals.noise, speed=1e-3))
+    at = truth(machine, recording, {"speed_latency": {"tau": 2e-4}}) | {"lag.speed_early": early}
+    block = next(b for b in machine.blocks(at, "a.nc", wanted=()) if b.equation == "sensor_speed")
+    assert np.min(block.factor[0] ** 2 / block.bands[0]) > 1e-3

@@ -13,6 +13,7 @@ BESIDE = 1e-2  # s, before and after a sample, between which the speed must swee
 REACHES = 3.0  # standard deviations, that the noise of a speed reaches to either side
 SENSOR = "speed_sensor"  # channel of what comes late before the controller takes it
 LITTLE = 0.01  # of the variance: covariances below it do not count
+SPECTRUM = 1024  # points of its spectrum
 
 
 def residual(state: State) -> Dual:
@@ -64,6 +65,10 @@ def noise_bands(state: State) -> list[np.ndarray]:
         np.convolve(longer, of_angle[: len(of_angle) - m] * of_angle[m:], "full")[len(of_angle) - 1 :][: rec.size - m]
         for m in range(last + 1)
     ]
+    # without those left out the spectrum may be below zero somewhere, as of a speed that is a filtered rate of the angle
+    # and has hardly any noise of its own, and the rest no covariance
+    spectrum = 2.0 * np.fft.rfft(shares[: last + 1], SPECTRUM).real - shares[0]
+    white += max(0.0, -float(spectrum.min())) * largest
     return [white + bands[0], *bands[1:]]
 
 
