@@ -65,8 +65,8 @@ def noise_bands(state: State) -> list[np.ndarray]:
         np.convolve(longer, of_angle[: len(of_angle) - m] * of_angle[m:], "full")[len(of_angle) - 1 :][: rec.size - m]
         for m in range(last + 1)
     ]
-    # without those left out the spectrum may be below zero somewhere, as of a speed that is a filtered rate of the angle
-    # and has hardly any noise of its own, and the rest no covariance
+    # without those left out the spectrum may be below zero somewhere, and the rest no covariance: of a speed that is a
+    # filtered rate of the angle and has hardly any noise of its own
     spectrum = 2.0 * np.fft.rfft(shares[: last + 1], SPECTRUM).real - shares[0]
     white += max(0.0, -float(spectrum.min())) * largest
     return [white + bands[0], *bands[1:]]
