@@ -225,8 +225,9 @@ def scanned(
                 continue
             value, best, driver = -np.inf, list[Found](), 0
             for shape, roughly, d in sorted(coarse, key=lambda c: -c[1]):
-                # no shape near it is worth proposing, or it explains less than another driver does once refined
-                if FINER * roughly + PRIOR < float(np.log(places)) or (best and roughly <= best[0].evidence):
+                # no shape near it is worth proposing, or explains as much as another driver does once refined
+                most_there = FINER * roughly
+                if most_there + PRIOR < float(np.log(places)) or (best and most_there <= best[0].evidence):
                     break
                 fine = [(f.evidence - float(np.log(f.among * places)) + PRIOR, f) for f in form.fine(left, d, shape)]
                 most = max(v for v, _ in fine)
