@@ -375,7 +375,7 @@ CHANNELS = {
     ),
     "angle homed by recording": changed("drift in sensor_angle", rotor_angle=lambda x, n: x + 0.02 * each(n)),
     "angle that drifts": changed(
-        "drift in sensor_angle", rotor_angle=lambda x, n: x + 0.02 * each(n + 1) * np.linspace(0.0, 1.0, len(x))
+        "drift in sensor_angle", rotor_angle=lambda x, n: x + 0.02 * np.linspace(0.0, 1.0, len(x))
     ),
     "bus voltage by recording": changed("drift in bus", bus_voltage=lambda v, n: v + 0.8 * each(n)),
     "bus voltage that drifts": changed(

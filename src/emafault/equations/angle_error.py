@@ -65,12 +65,8 @@ def derivatives(values: Mapping[str, float], recording: str, length: float) -> d
 
 def _drifts(recording: str) -> dict[str, tuple[int, bool]]:
     """Parameters of a zero that drifts, each with its term and whether it is a rate (rad/s)."""
-    (_, (own, at), (along, _)) = drifting(recording)
-    return {
-        f"{own}_angle.all{at}": (DRIFTED, False),
-        f"{along}_angle.all{at}": (DRIFTED + 1, False),
-        f"{RATE}_angle.all": (DRIFTED + 1, True),
-    }
+    _, (own, at), _ = drifting(recording)
+    return {f"{own}_angle.all{at}": (DRIFTED, False), f"{RATE}_angle.all": (DRIFTED + 1, True)}
 
 
 def _loggers() -> list[str]:

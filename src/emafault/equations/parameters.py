@@ -249,6 +249,8 @@ def _drifts(a: ActuatorParameters, recordings: Mapping[str, Signals], reference:
                 for kind in ("offset", "drift")
             )
             variants = [Variant(along), Variant(each), Variant([*each, *along]), Variant([rate])]
+            if quantity == "angle":  # one that grew by another amount in each would be a clock's at an even speed
+                variants = [Variant(each), Variant([rate])]
             unit = f"~drift_{quantity}_{j}" if len(phases) > 1 else f"~drift_{quantity}"
             variants += [Variant([always]), Variant([always, rate])] if quantity not in LISTED_OFFSET else []
             # evenly over the quantities, then over a quantity's phases and its gain
