@@ -51,18 +51,6 @@ def test_what_wanders_is_a_remainder_unless_a_listed_effect_acts_there():
     assert elsewhere.verdict == "partly" and elsewhere.named == ("gain",)
 
 
-@pytest.mark.parametrize(("other", "told"), [("torque", ("~function",)), ("bus", ())])
-def test_of_forms_that_stand_in_for_each_other_the_likeliest_is_told(other, told):
-    """Each by itself is not likely enough; together with what it cannot be taken for it is not told either."""
-    units = [
-        unit("load", "torque"),
-        *(unit(f"~{n}", q, kind="form") for n, q in (("function", "torque"), ("b", other))),
-    ]
-    found = read([model(0.4, "load", "~function"), model(0.0, "load", "~b"), model(-6.0, "load")], units)
-    assert found.forms == told and found.named == ("load",)
-    assert found.verdict == ("partly" if told else "explained")
-
-
 @pytest.mark.parametrize(("rest", "told"), [("remainder:sensor_speed", True), ("remainder:torque", False)])
 def test_a_form_that_is_there_or_left_as_a_remainder_of_its_equation_is_told(rest, told):
     units = [unit("~drift_speed", "sensor_speed", kind="form"), unit(rest, rest.split(":")[1], kind="remainder")]

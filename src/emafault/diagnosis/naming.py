@@ -1,8 +1,7 @@
 """From a posterior over sets to names: one rule, an inclusion probability of at least ``NAMED``.
 
 Effects whose inclusions reach it only together, one standing in for the other in the sets, are a group; a form that
-reaches it only together with the undescribed remainder of its equation is told, if it is the likelier, and of forms
-that do so only together, one standing in for the other, the likeliest.
+reaches it only together with the undescribed remainder of its equation is told, if it is the likelier.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -78,13 +77,9 @@ def read(
     inclusion = {u: min(p, 1.0) for u, p in inclusion.items()}  # sums of masses, but for rounding
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
-    equations = {u.id: u.equations if one_equation else ("",) for u in units}
-    groups = _groups(models, weights, open_, inclusion, equations)
+    groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})
     present = [e for e, p in inclusion.items() if p >= PRESENT and kind.get(e) == "form"]
-    sure = {e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED}
-    doubtful = [e for e in inclusion if kind.get(e) == "form" and e not in sure]
-    alike = _groups(models, weights, doubtful, inclusion, equations)
-    forms = tuple(sorted(sure | {max(g, key=lambda e: inclusion[e]) for g in alike}))
+    forms = tuple(sorted(e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED))
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     of_controller = {u.id for u in units if u.of_controller}
     # a form that is not told is no explanation, and no sign that there is nothing
