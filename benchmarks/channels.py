@@ -24,7 +24,8 @@ from emafault import config
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
-from emafault.io.recording import VARIABLES, Recording, read_recording, write_recording
+from emafault.io.recording import Recording, read_recording, write_recording
+from emafault.io.rows import of_rows
 from emafault.resampled import before
 
 EFFECTS = {
@@ -125,12 +126,6 @@ def standing_still(r: Recording, n: int) -> Recording:
     for x in out.values():
         x[at : at + 25] = x[at]
     return replace(r, **out)
-
-
-def of_rows(r: Recording, rows: np.ndarray) -> Recording:
-    """Some rows of a recording, whose time counts what is there."""
-    found = {name: x[rows] for name in VARIABLES if (x := getattr(r, name)) is not None}
-    return replace(r, **found | {"time": r.time[: len(rows)]})
 
 
 def with_missing_rows(r: Recording, n: int) -> Recording:

@@ -5,16 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.io.recording import VARIABLES
-from emafault.io.rows import filled, without_rows_twice
+from emafault.io.rows import filled, of_rows, without_rows_twice
 from emafault.io.sensors import stalled
 
 from .conftest import recorded
-
-
-def of_rows(plain, rows):
-    found = {n: x[rows] for n in VARIABLES if (x := getattr(plain, n)) is not None}
-    return replace(plain, **found | {"time": plain.time[0] + plain.interval * np.arange(len(rows))})
 
 
 @pytest.mark.parametrize("count", [1, 5, 40])

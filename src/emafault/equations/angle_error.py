@@ -1,7 +1,7 @@
 """An angle that is recorded late, or whose zero drifts: what is to be added to it, to the second order of the lag.
 
 Terms of the signals w, by how much a smoothed angle changes in an interval, and b, by how much that changes; t is the
-time, all in intervals; of a drift one and a share of the recording. The noise of the recorded angle is that of the
+time, all in intervals; of a drift one and the time in seconds. The noise of the recorded angle is that of the
 equations, which differences of it would add to.
 """
 
@@ -13,7 +13,7 @@ from .acquisition import CLOCKS, RATE, clock_names, drifting
 from .signals import Signals
 
 LAGS = {"lag.angle_late": 1.0, "lag.angle_early": -1.0}  # parameters of all recordings alike, with their sides
-TERMS = 7  # w, b, t w, t b, t^2 b, one, share
+TERMS = 7  # w, b, t w, t b, t^2 b, one, time
 DRIFTED = 5  # the first of those of a drift
 
 
@@ -28,14 +28,14 @@ def terms(rec: Signals) -> np.ndarray:
     t = np.arange(1.0, rec.size + 1.0)
     bend = rec.acceleration * h**2
     turned = rec.speed * h + 0.5 * bend
-    return np.array([turned, bend, t * turned, t * bend, t * t * bend, np.ones(rec.size), rec.time / rec.time[-1]])
+    return np.array([turned, bend, t * turned, t * bend, t * t * bend, np.ones(rec.size), rec.time])
 
 
-def correction(values: Mapping[str, float], recording: str, length: float) -> np.ndarray:
+def correction(values: Mapping[str, float], recording: str) -> np.ndarray:
     """(TERMS,) coefficients of what is to be added to the recorded angle.
 
     One that is late by a share l is recorded as (1 - l) y[n] + l y[n - 1], or with n + 1, one of another logger as it
-    was a time before. ``length``: of the recording (s).
+    was a time before.
     """
     out = np.zeros(TERMS)
     for name, side in LAGS.items():
@@ -43,12 +43,12 @@ def correction(values: Mapping[str, float], recording: str, length: float) -> np
         out[:2] += side * lag, lag * lag - 0.5 * lag
     start, rate = _behind(values, recording)
     out[:DRIFTED] += start, 0.5 * start * start, rate, start * rate, 0.5 * rate * rate
-    for name, (term, per) in _drifts(recording).items():
-        out[term] -= values.get(name, 0.0) * (length if per else 1.0)
+    for name, term in _drifts(recording).items():
+        out[term] -= values.get(name, 0.0)
     return out
 
 
-def derivatives(values: Mapping[str, float], recording: str, length: float) -> dict[str, np.ndarray]:
+def derivatives(values: Mapping[str, float], recording: str) -> dict[str, np.ndarray]:
     """(TERMS,) the same coefficients, differentiated by each parameter."""
     out = {name: np.zeros(TERMS) for name in names(recording)}
     for name, side in LAGS.items():
@@ -58,15 +58,15 @@ def derivatives(values: Mapping[str, float], recording: str, length: float) -> d
         by_start, by_rate = clock_names(of, recording)
         out[by_start][:4] = 1.0, start, 0.0, rate
         out[by_rate][2:DRIFTED] = 1.0, start, rate
-    for name, (term, per) in _drifts(recording).items():
-        out[name][term] = -(length if per else 1.0)
+    for name, term in _drifts(recording).items():
+        out[name][term] = -1.0
     return out
 
 
-def _drifts(recording: str) -> dict[str, tuple[int, bool]]:
-    """Parameters of a zero that drifts, each with its term and whether it is a rate (rad/s)."""
+def _drifts(recording: str) -> dict[str, int]:
+    """Parameters of a zero that is the recording's own or drifts, each with its term."""
     _, (own, at), _ = drifting(recording)
-    return {f"{own}_angle.all{at}": (DRIFTED, False), f"{RATE}_angle.all": (DRIFTED + 1, True)}
+    return {f"{own}_angle.all{at}": DRIFTED, f"{RATE}_angle.all": DRIFTED + 1}
 
 
 def _loggers() -> list[str]:

@@ -181,7 +181,7 @@ class ReferenceActuator:
         rec = self._noisy(name) if disturbed else self.recordings[name]
         of_angle = [n for n in angle_error.names(name) if wanted is None or n in wanted]
         less = dict(less or {})
-        ahead = angle_error.correction(values, name, rec.time[-1])
+        ahead = angle_error.correction(values, name)
         terms = angle_error.terms(self.recordings[name]) if of_angle or ahead.any() else np.zeros((0, 0))
         if ahead.any():
             less["angle"] = less.get("angle", 0.0) - ahead @ terms
@@ -201,7 +201,7 @@ class ReferenceActuator:
     ) -> None:
         """Columns of what an angle is late or off by, of the ``terms`` of ``angle_error``, to blocks of a recording."""
         name = blocks[0].recording
-        by_name = angle_error.derivatives(values, name, self.recordings[name].time[-1])
+        by_name = angle_error.derivatives(values, name)
         shares = np.array([by_name[n] for n in names])
         used = np.flatnonzero(shares.any(axis=0))
         if self.large and name not in self._late:

@@ -22,7 +22,7 @@ def without_rows_twice(recording: Recording) -> tuple[Recording, int]:
             turns = abs(recording.rotor_speed[last]) > MOVING
             on = not turns or makes_up(recording.rotor_angle, before, last)
         twice[before + 1 : last + 1] = not on
-    return (_of_rows(recording, np.flatnonzero(~twice)), int(twice.sum())) if twice.any() else (recording, 0)
+    return (of_rows(recording, np.flatnonzero(~twice)), int(twice.sum())) if twice.any() else (recording, 0)
 
 
 def filled(recording: Recording) -> tuple[Recording, dict[int, int]]:
@@ -42,10 +42,10 @@ def filled(recording: Recording) -> tuple[Recording, dict[int, int]]:
     times = np.ones(len(recording.time), int)
     for row, count in missing.items():
         times[row - 1] += count
-    return _of_rows(recording, np.repeat(np.arange(len(times)), times)), missing
+    return of_rows(recording, np.repeat(np.arange(len(times)), times)), missing
 
 
-def _of_rows(recording: Recording, rows: np.ndarray) -> Recording:
+def of_rows(recording: Recording, rows: np.ndarray) -> Recording:
     """Some rows of a recording, one interval after the other."""
     found = {n: x[rows] for n in VARIABLES if (x := getattr(recording, n)) is not None}
     time = recording.time[0] + recording.interval * np.arange(len(rows))
