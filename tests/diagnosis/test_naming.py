@@ -60,6 +60,23 @@ def test_a_form_that_is_there_or_left_as_a_remainder_of_its_equation_is_told(res
     assert read([model(0.0, "~drift_speed"), model(1.0, rest)], units).forms == ()
 
 
+def test_of_forms_that_are_the_same_but_for_what_is_free_the_likelier_is_told():
+    same = replace(unit("~function_also", "torque", kind="form"), same_as="~function")
+    units = [unit("load", "torque"), unit("~function", "torque", kind="form"), same]
+    found = read([model(0.1, "load", "~function_also"), model(0.0, "load", "~function"), model(-30.0)], units)
+    assert (found.verdict, found.named, found.forms) == ("partly", ("load",), ("~function_also",))
+    assert found.inclusion["~function_also"] > 0.999 and not found.left
+
+
+def test_what_is_left_for_certain_without_a_form_that_is_told_is_a_remainder():
+    units = [unit("load", "torque"), *(unit(f"~{n}", "torque", kind="form") for n in ("wave", "function"))]
+    found = read([model(0.1, "load", "~wave"), model(0.0, "load", "~function"), model(-30.0)], units)
+    assert (found.verdict, found.forms, found.left) == ("partly", (), ("remainder:torque",))
+    assert found.places["torque"] > 0.999 and not found.remainders
+    perhaps = read([model(0.0, "load"), model(-1.0, "load", "~wave"), model(-30.0)], units)
+    assert (perhaps.verdict, perhaps.left) == ("explained", ()) and 0.2 < perhaps.places["torque"] < 0.3
+
+
 def test_where_a_form_or_an_effect_is_sure_but_not_which_something_is_unknown_there():
     units = [unit("gain", "electrical"), unit("~function", "electrical_a", kind="form")]
     either = read([model(0.0, "~function"), model(-1.0, "gain"), model(-30.0)], units)

@@ -8,6 +8,8 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 from emafault.actuator.sensors import SensorNoise
+from emafault.equations.point import Point
+from emafault.equations.rounding import error, names_of
 from emafault.equations.signals import STRETCH, Signals, estimated_noise
 from emafault.io.lattice import spacing
 from emafault.io.sensors import spikes
@@ -71,6 +73,24 @@ def test_over_a_stretch_of_a_slow_current_in_steps_the_error_changes_evenly(step
         for less in ([0.0] * len(long), [e.mean() for e in long], lines)
     )
     assert but_a_line < 0.05 * all_of_it and but_a_line < 0.5 * but_a_constant
+
+
+@pytest.mark.parametrize("command", ["parabolic", "reversal"])
+def test_what_coarse_steps_add_to_a_slow_current_goes_with_what_the_torque_needs(command):
+    step = 0.09
+    plain = recorded(command)
+    coarse = in_steps(plain, {"phase_current": step, "phase_current_end": step})
+    machine = machine_of({"a.nc": coarse})
+    rec = machine.recordings["a.nc"]
+    at_off = {n: p.off for n, p in machine.parameters.items()}
+    columns = error(rec, Point(at_off, "a.nc")).slopes
+    names = [n for n in columns if n.startswith("steps.")]
+    known = np.array([columns[n] for n in names]).T[rec.moving]
+    added = (np.abs(coarse.phase_current) - np.abs(plain.phase_current)).sum(axis=1)[rec.moving] / 2.0
+    left = added - known @ np.linalg.lstsq(known, added, rcond=None)[0]
+    slow, slow_left = (np.var(uniform_filter1d(x, 50)) for x in (added, left))
+    assert len(names) == 6 and slow_left < 0.3 * slow
+    assert names_of(machine_of({"a.nc": plain}).recordings["a.nc"]) == {}
 
 
 def test_an_encoder_s_counts_are_noise_of_rounding_however_evenly_it_turns():

@@ -130,7 +130,7 @@ def _beside_causes(bench: Bench) -> tuple[_Told, tuple[str, ...]]:
     leading = reading.sets[0][2] if likely else fit.models[0]
     values = bench.inserted(leading, fit.normal).values
     # a remainder of the controller's own equations is none of the machine
-    left = [r.split(":", 1)[1] for r in reading.remainders if r.split(":", 1)[1] not in SETTINGS]
+    left = [r.split(":", 1)[1] for r in reading.left if r.split(":", 1)[1] not in SETTINGS]
     words = [*reading.named, *(" or ".join(g) for g in reading.groups), *reading.forms]
     words += [f"more than noise in the {equation} equation" for equation in left]
     return _told(bench, values, *covariance_of(bench, fit.normal, leading)), tuple(words)

@@ -80,7 +80,9 @@ class Described:
         """A candidate cause."""
         each = [n for r in (recordings if FORMS[self.word].EACH else recordings[:1]) for n in self.names(r)]
         parameters = [Parameter(n, 0.0, 0.0, SPAN * self.scale) for n in each]
-        return Unit(self.id, "form", (self.equation,), [Variant(parameters)], among=self.among, proposed=True)
+        same_as = self.id.removesuffix(ALSO) if self.id.endswith(ALSO) else ""
+        variants, equations = [Variant(parameters)], (self.equation,)
+        return Unit(self.id, "form", equations, variants, among=self.among, proposed=True, same_as=same_as)
 
     def known(self, block: Block) -> np.ndarray | None:
         """(row,) where a block says something of the form, or does not need to; None: everywhere."""

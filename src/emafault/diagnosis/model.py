@@ -60,6 +60,7 @@ class Unit:
     among: float = 1.0  # alternatives of a form that the prior of its kind is spread over
     alike: bool = False  # whether its variants look alike near off, and are told apart at their own optima alone
     proposed: bool = False  # of a form: by a scan of what is left
+    same_as: str = ""  # another form that it differs from by what is free beside both
 
     @property
     def of_controller(self) -> bool:

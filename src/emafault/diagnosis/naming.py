@@ -38,13 +38,18 @@ class Reading:
     sets: Sequence[tuple[tuple[str, ...], float, Model]]  # listed effects of a set, its mass, its leading model
     empty: float  # mass of sets without listed effect that leave nothing undescribed
     unknown: float  # mass of the other sets without listed effect: with a remainder, or a form that is not told
-    places: Mapping[str, float]  # by equation, the largest inclusion of a remainder or of a form that is not told
+    places: Mapping[str, float]  # by equation, the mass of the sets with a remainder of it, or a form that is not told
     verdict: str
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """Remainders that the verdict tells: those of the sets, and those of what is there in one form or another."""
+        return _present(self.places)
 
     @property
     def told(self) -> frozenset[str]:
         """Units that the verdict tells."""
-        return frozenset((*self.named, *(e for g in self.groups for e in g), *self.forms, *self.remainders))
+        return frozenset((*self.named, *(e for g in self.groups for e in g), *self.forms, *self.left))
 
 
 def read(
@@ -78,25 +83,27 @@ def read(
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
     groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})
+    inclusion |= {e: p for same in _same(units) for e, p in _either(models, weights, same).items()}
     present = [e for e, p in inclusion.items() if p >= PRESENT and kind.get(e) == "form"]
     forms = tuple(sorted(e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED))
-    remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     of_controller = {u.id for u in units if u.of_controller}
     # a form that is not told is no explanation, and no sign that there is nothing
-    undescribed = {u.id for u in units if u.kind == "form"} - {*forms, *of_controller}
+    known = {e for same in _same(units) if same & set(forms) for e in same} | set(forms)
+    undescribed = {u.id for u in units if u.kind == "form"} - known - of_controller
+    remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     left_over = undescribed | {u for u in inclusion if _is_left(u, kind)}
+    places = _places(models, weights, {u: acts[u][0] for u in undescribed}, wandering_of)
     left = [not left_over.isdisjoint(m.units) for m in models]
     steady = [float(np.prod([1.0 - p for p in may.values()])) for may in wandering_of]
     mass = _masses(models, weights, listed_of, np.where(left, 0.0, steady), acts)
     of_machine = set(forms) - of_controller
-    beside = bool(counted or of_machine or [r for r in remainders if r not in OWN_BUSINESS])
+    beside = bool(counted or of_machine or set(_present(places)).difference(OWN_BUSINESS))
     if named or groups:
         verdict = "partly" if beside else "group" if groups else "explained"
     elif of_machine or (counted and mass.nothing >= 0.5):
         verdict = "described"
     else:
         verdict = "no_gap" if mass.nothing >= 0.5 else "unknown"
-    places = _places(inclusion, {u: acts[u][0] for u in undescribed})
     return Reading(named, groups, forms, remainders, inclusion, mass.sets, mass.empty, mass.unknown, places, verdict)
 
 
@@ -136,14 +143,44 @@ def _masses(
     return _Masses(sets, empty, unknown, max(0.0, empty + settings))
 
 
-def _places(inclusion: Mapping[str, float], undescribed: Mapping[str, str]) -> dict[str, float]:
-    """By equation, the largest inclusion of a remainder or, in its first equation, of a form that is not told."""
+def _present(places: Mapping[str, float]) -> tuple[str, ...]:
+    """Remainders of the equations where something undescribed is more likely there than not."""
+    return tuple(sorted(f"remainder:{e}" for e, p in places.items() if p >= PRESENT))
+
+
+def _same(units: Iterable[Unit]) -> list[set[str]]:
+    """Forms that differ from each other by what is free beside them, of each the others too."""
+    out: dict[str, set[str]] = {}
+    for u in units:
+        if u.same_as:
+            out.setdefault(u.same_as, {u.same_as}).add(u.id)
+    return list(out.values())
+
+
+def _either(models: Sequence[Model], weights: Sequence[float], same: set[str]) -> dict[str, float]:
+    """Mass of the sets that have any of several forms, as the inclusion of the one that the likeliest of them has."""
+    having = [(w, same & set(m.units)) for m, w in zip(models, weights, strict=True)]
+    most = max(((w, sorted(own)[0]) for w, own in having if own), default=None)
+    return {} if most is None else {most[1]: min(sum(w for w, own in having if own), 1.0)}
+
+
+def _places(
+    models: Sequence[Model],
+    weights: Sequence[float],
+    undescribed: Mapping[str, str],
+    wandering_of: Sequence[Mapping[str, float]],
+) -> dict[str, float]:
+    """By equation, the mass of the sets that leave something undescribed in it: a remainder, one that wanders, or, in
+    its first equation, a form that is not told."""
     out: dict[str, float] = {}
-    for u, p in inclusion.items():
-        place = u.removeprefix("remainder:") if u.startswith("remainder:") else undescribed.get(u)
-        if place is not None:
-            out[place] = max(p, out.get(place, 0.0))
-    return out
+    for m, w, wandering in zip(models, weights, wandering_of, strict=True):
+        left = {u for u in m.units if u.startswith("remainder:")} | {
+            f"remainder:{undescribed[u]}" for u in m.units if u in undescribed
+        }
+        for u in left | set(wandering):
+            e = u.removeprefix("remainder:")
+            out[e] = out.get(e, 0.0) + w * (1.0 if u in left else wandering[u])
+    return {e: min(p, 1.0) for e, p in out.items()}
 
 
 def _is_left(unit: str, kind: Mapping[str, str]) -> bool:

@@ -15,7 +15,7 @@ from ..actuator.grammar import LOGGERS
 from ..actuator.parameters import ActuatorParameters
 from ..first_order import LEAST, ahead, filtered, response, smoothed
 from ..switches import direction, turning
-from .dual import Dual, Number
+from .dual import Dual
 from .point import Point, effect_name
 from .signals import AROUND, Signals
 from .terms import with_hook
@@ -226,38 +226,6 @@ def gain(p: Point, j: int) -> Dual:
     return out
 
 
-def _rounding(rec: Signals, p: Point) -> Dual | None:
-    """What a converter's coarse steps add to the size of a current that changes slowly (A), (sample,): the same in
-    both directions, and evenly from one value to another while the current goes through a step. What they add to others
-    is noise."""
-    columns = errors_of_rounding(rec.rows_from)
-    if not columns:
-        return None
-    value = np.zeros(rec.size)
-    slopes: dict[str, Number] = {}
-    for name, column in columns.items():
-        off = p(name)
-        if off.value:
-            value += off.value * column
-        slopes |= dict.fromkeys(off.slopes, column)
-    return Dual(value, slopes)
-
-
-def errors_of_rounding(rec: Signals) -> dict[str, np.ndarray]:
-    """Errors at the start and at the end of each stretch, and what each of them is along it; (sample,) by name."""
-    return rec.once(("rounding",), lambda: _new_errors(rec))
-
-
-def _new_errors(rec: Signals) -> dict[str, np.ndarray]:
-    out: dict[str, np.ndarray] = {}
-    for k, there in enumerate(rec.stretches()):
-        along = np.linspace(0.0, 1.0, there.stop - there.start)
-        for end, share in (("start", 1.0 - along), ("end", along)):
-            column = out[f"rounded.{k}_{end}@{rec.name}"] = np.zeros(rec.size)
-            column[there] = share
-    return out
-
-
 def drifted(p: Point, quantity: str, phase: str, rec: Signals) -> Dual | float:
     """(sample,) what a channel has too much: an offset, of all or of the recording's own, what grows along it, and what
     grows with time in all of them alike."""
@@ -301,10 +269,9 @@ class Currents(NamedTuple):
     lag: list[Dual]
 
 
-def currents(rec: Signals, p: Point) -> Currents:
+def currents(rec: Signals, p: Point, rounding: Dual | None) -> Currents:
     """The currents from the recorded ones: less lag, curve, crosstalk and drift of the recorder, then less offset and
-    gain of the sensors."""
-    rounding = _rounding(rec, p)
+    gain of the sensors; ``rounding``: what the size of the means has too much (A), (sample,)."""
     means: list[Dual] = []
     ends: list[Dual] = []
     shown: list[Dual] = []

@@ -10,7 +10,7 @@ from ..diagnosis.model import TOLERANCES, Parameter, Unit, Variant
 from ..effects import Effect
 from ..effects.scaling import scale
 from ..switches import TURN
-from . import acquisition, commutation, position
+from . import acquisition, commutation, position, rounding
 from .coordinates import typical_torque
 from .point import SEEDED
 from .sensor_speed import SENSOR
@@ -92,10 +92,10 @@ def nuisances(
         out[full] = Parameter(full, 0.0, 0.0, FAR_OUT * rec.noise.speed, "rad/s")
         full = f"controller.timing@{name}"
         out[full] = Parameter(full, 0.0, 0.0, TIMING * a.control_period, "s")
-        for full, k, _ in position.rounding_names(name) if rec.output_step > 0.0 else ():
+        for full, k, _ in rounding.harmonics("counts", name) if rec.output_step > 0.0 else ():
             out[full] = Parameter(full, 0.0, 0.0, rec.output_step / (np.sqrt(2.0) * np.pi * k), "rad")
-        for full in acquisition.errors_of_rounding(rec):
-            out[full] = Parameter(full, 0.0, 0.0, rec.current_step / np.sqrt(12.0), "A")
+        for full, sd in rounding.names_of(rec).items():
+            out[full] = Parameter(full, 0.0, 0.0, sd, "A")
         for full in (n for j in range(3) for n in commutation.passing(j, name)):
             out[full] = Parameter(full, 0.0, 0.0, commutation.ripple_time(a), "s")
         if rec.health == "seeded":

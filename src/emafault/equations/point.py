@@ -79,11 +79,12 @@ class State:
     net: np.ndarray
     inertia: float
 
-    def __init__(self, rec: Signals, point: Point):
+    def __init__(self, rec: Signals, point: Point, rounds: bool = True):
+        """``rounds``: whether the recorded currents are less what coarse steps have added to them."""
         from . import quantities
 
         self.rec, self.p = rec, point
-        quantities.fill(self)
+        quantities.fill(self, rounds)
 
     def at(self, point: Point) -> "State":
         """The same quantities without their derivatives, for terms at another point."""

@@ -1,16 +1,14 @@
 """theta_u against theta/ratio through the play, which is integrated along the measured angle."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from .acquisition import drifted, recorded_late
 from .dual import Dual, value_of
 from .flexible import through_play
 from .point import State, effect_name
+from .rounding import harmonics
 from .terms import with_hook
 
-HARMONICS = 3  # of the error of rounding, with 83 % of its variance
 SCALED = ("recorder", "sensor")  # whose scale of the output may be off: the controller sees its sensor's
 
 
@@ -41,11 +39,6 @@ def residual(state: State) -> Dual:
     return state.rec.output - (seen + drifted(state.p, "output", "all", state.rec))
 
 
-def rounding_names(recording: str) -> list[tuple[str, int, Callable]]:
-    """Names, harmonics and functions of what rounding to counts adds to a channel."""
-    return [(f"counts.{f.__name__}_{k}@{recording}", k, f) for k in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
-
-
 def _rounding(state: State, shaft: Dual) -> Dual:
     """What an output in coarse counts q is off by: sum of (-1)^k q/(pi k) sin(2 pi k x/q) of the true angle x (Widrow
     and Kollar 2008, Quantization Noise, chapter 3), less where noise shakes it, and with the phase left open."""
@@ -53,7 +46,7 @@ def _rounding(state: State, shaft: Dual) -> Dual:
     if state.rec.output_step == 0.0:
         return out
     place = 2.0 * np.pi * np.asarray(shaft.value) / state.rec.output_step
-    for name, k, function in rounding_names(state.rec.name):
+    for name, k, function in harmonics("counts", state.rec.name):
         out = out + state.p(name) * function(k * place)
     return out
 

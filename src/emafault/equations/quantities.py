@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..actuator.shape import trapezoid_at, trapezoid_swept
-from . import waveform, windings
+from . import rounding, waveform, windings
 from .acquisition import currents
 from .dual import Dual, Number, value_of
 from .point import SEEDED, State, effect_name
@@ -14,9 +14,10 @@ PLATEAU = np.pi / 6.0  # electrical rad, where the commutation switches a phase 
 NARROW = 1e-5  # electrical rad; a phase that is on for less carries no current
 
 
-def fill(state: State) -> None:
-    """Compute them, in the order in which they depend on one another."""
+def fill(state: State, rounds: bool = True) -> None:
+    """Compute them, in the order in which they depend on one another; see ``State`` for ``rounds``."""
     rec, p = state.rec, state.p
+    off = rounding.error(rec, p) if rounds else None
     state.dT = p.own("dT") + p(f"ambient.start@{rec.name}") + rec.dT_measured
     # the terms of the effects see the recording
     rec.dT = state.dT
@@ -28,7 +29,7 @@ def fill(state: State) -> None:
     rec.load = _sum(state, "load") + state.own_load * rec.actuator.gear_ratio
     rec.spring = _sum(state, "spring")
     rec.flexible = flexible(state)
-    state.current, state.current_end, state.shown, state.lag = currents(rec, p)
+    state.current, state.current_end, state.shown, state.lag = currents(rec, p, off)
     _angles(state)
     _coefficients(state)
     _resistances(state)

@@ -210,12 +210,12 @@ def _discovered(fitted: Fitted) -> list[dict]:
                 "recordings": list(bench.recordings), **entry,
             }
         )  # fmt: skip
-    for left in reading.remainders:
+    for left in reading.left:
         equation = left.split(":", 1)[1]
         out.append(
             {
                 "unit": left, "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
-                "probability": float(reading.inclusion[left]), "closed": None,
+                "probability": float(reading.places[equation]), "closed": None,
                 "another_form_of": another_form_of(partly, fit.search, left, model.deviations), "parameters": {},
                 "recordings": list(bench.recordings),
                 "sentence": remainder_sentence(fit.search, equation, fitted.changes),
@@ -245,7 +245,7 @@ def _controller(fitted: Fitted) -> dict[str, dict]:
     n = [x for x in bench.nuisances if x.startswith("controller.")]
     beside = [u for u in bench.units if u.id in fitted.reading.forms and u.of_controller]
     n += [p.name for u in beside for p in u.parameters if p.name in index]
-    if "remainder:control" in fitted.reading.remainders:  # which may stand in for a gain
+    if "remainder:control" in fitted.reading.left:  # which may stand in for a gain
         n += [x for x in index if x.startswith("remainder.control.")]
     k = np.array([index[x] for x in n])
     prior = np.array([1.0 / bench.prior(x)[1] ** 2 for x in n])

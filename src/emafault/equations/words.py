@@ -123,6 +123,7 @@ def _of_group(group: str, short: str) -> str:
         "clock": f"{short} is recorded late by",
         "clock_rate": f"{short} is recorded by a clock that is slow by",
         "counts": f"rounding of the output position, {short.replace('_', ' of harmonic ')}",
+        "steps": f"rounding of the current, {short.replace('_', ' of harmonic ')}",
         "rounded": f"rounding of the current, stretch {short.replace('_', ', ')}",
         "lag": f"{channel_in_words(late)} {_late(short.rpartition('_')[2])}",
         **{
