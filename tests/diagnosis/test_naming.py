@@ -151,7 +151,7 @@ def held(
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
     monkeypatch.setattr(held_out, "_misfit", lambda explored, m, out="": misfit[tuple(u for u in m.units if u != out)])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
-    monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect: another)
+    monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect, lacking: another)
     explored = held_out.Explored(None, SimpleNamespace(models=explored, search=search), None)
     kept, found = held_out.held_to_account(None, everything, named, explored, dict(wandering))
     return kept, found.ratios, found.changes

@@ -6,7 +6,7 @@ drawn anew for each, with zero mean instead of a common one (Higgins, Thompson a
 Royal Statistical Society A 172, 137).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from .evidence import Reduced, log_evidence
 from .fit import Bench, Fit
 from .linear import White, assemble, function_of
-from .model import WORDS
+from .model import WORDS, meet
 from .set_prior import ONE_MORE_FORM, OTHER_FORM_PRIOR, SIZE_PRIOR
 from .sets import OTHER_FORM, Model
 
@@ -66,7 +66,7 @@ def log_odds_of_change(bench: Bench, fit: Fit, model: Model, unit: str) -> float
     return float(log_mean(changing) - log_mean(constant) + PRIOR)
 
 
-def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
+def log_odds_of_another_cause(fit: Fit, model: Model, unit: str, lacking: Collection[str] = ()) -> float:
     """Log posterior odds of a discrepancy as large as a unit of a set itself, or larger, against the unit in the
     library's form or one near it: what a unit takes up of another cause has such a discrepancy.
 
@@ -75,6 +75,11 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     it each equation has, are the same on both sides.
 
     Minus infinity for a unit that carries no form of its own, or none along anything.
+
+    Parameters
+    ----------
+    lacking : equations in which something else is left too: a discrepancy there says nothing of a unit that acts in
+        others as well
     """
     choice = next(c for c in model.choices if c.unit == unit)
     forms = [
@@ -86,6 +91,9 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
     evidence = partial(_evidence, fit.search.reduced)
     itself = {n: q for n, q in prior.items() if not n.startswith(f"own.{unit}.")}
     own = [{names[k]: (0.0, float(s)) for k, s in zip(f.extra, f.extra_sd, strict=True)} for f in forms]
+    elsewhere = [{n: sd for n, sd in form.items() if not _in_any(n, lacking)} for form in own]
+    if any(function_of(n) for form in elsewhere for n in form):
+        own = elsewhere
     near = [evidence(itself | form) for form in own]
     widest = {tuple(form): form for form in sorted(own, key=lambda form: max(form.values()))}
     along = [(form, [n for n in form if function_of(n)]) for form in widest.values()]
@@ -94,6 +102,11 @@ def log_odds_of_another_cause(fit: Fit, model: Model, unit: str) -> float:
         return -np.inf
     of = [evidence(itself) + np.log(1.0 - OTHER_FORM_PRIOR), log_mean(near) + np.log(OTHER_FORM_PRIOR)]
     return float(log_mean(far) - logsumexp(of) + PRIOR)
+
+
+def _in_any(own: str, equations: Collection[str]) -> bool:
+    """Whether a column of an own form is a function's in one of some equations."""
+    return bool(function_of(own)) and meet(own.split(".")[2:3], equations)
 
 
 def _evidence(reduced: Reduced, free: Mapping[str, tuple[float, float]]) -> float:

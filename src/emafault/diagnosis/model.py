@@ -1,6 +1,6 @@
 """What the diagnosis needs of a machine: parameters with priors, candidate units, and equations as blocks of rows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -72,6 +72,11 @@ class Unit:
         """Every parameter of every variant."""
         every = [p for v in self.variants for p in v.parameters]
         return every + [p for p in (self.on.parameters if self.on else ()) if p not in every]
+
+
+def meet(one: Collection[str], other: Collection[str]) -> bool:
+    """Whether two effects act in a common equation; that of one phase is one of the electrical ones."""
+    return any(a == b or a.startswith(f"{b}_") or b.startswith(f"{a}_") for a in one for b in other)
 
 
 @dataclass

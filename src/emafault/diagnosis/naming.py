@@ -4,7 +4,7 @@ Effects whose inclusions reach it only together, one standing in for the other i
 reaches it only together with the undescribed remainder of its equation is told, if it is the likelier.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from .model import LISTED, SETTINGS, Unit
+from .model import LISTED, SETTINGS, Unit, meet
 from .search import Search
 from .sets import Model, posterior
 
@@ -238,11 +238,6 @@ def _groups(models, weights, effects, inclusion, equations) -> tuple[tuple[str, 
                 out.append(tuple(sorted(group)))
                 used |= set(group)
     return tuple(out)
-
-
-def meet(one: Collection[str], other: Collection[str]) -> bool:
-    """Whether two effects act in a common equation; that of one phase is one of the electrical ones."""
-    return any(a == b or a.startswith(f"{b}_") or b.startswith(f"{a}_") for a in one for b in other)
 
 
 def told_sets(

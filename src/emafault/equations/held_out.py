@@ -13,8 +13,8 @@ from ..diagnosis.dispersion import overdispersion
 from ..diagnosis.evidence import CLEAR, Definite
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.linear import White, assemble
-from ..diagnosis.model import LISTED
-from ..diagnosis.naming import OWN_BUSINESS, PRESENT, meet, read
+from ..diagnosis.model import LISTED, meet
+from ..diagnosis.naming import OWN_BUSINESS, PRESENT, read
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import NEAR, Search
 from ..diagnosis.sets import Model, inclusion
@@ -106,7 +106,7 @@ def held_to_account(
         leading = sets.leading(effect)
         change = log_odds_of_change(bench, fit, leading, effect)
         changes |= dict.fromkeys(told, change)
-        other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect))
+        other = np.logaddexp(change, log_odds_of_another_cause(fit, leading, effect, sets.lacking(leading)))
         # where hardly any probability goes to another size or cause, a remainder there need not be confirmed
         left = other < -CLEAR or account.instead(effect) >= CLEAR
         sets.add_without(effect, left, sets.log_mass(told) + other)
@@ -201,6 +201,10 @@ class _Sets:
     def leading(self, unit: str) -> Model:
         """The likeliest set with a unit."""
         return max((m for m in self.models if unit in m.units), key=lambda m: m.log_posterior)
+
+    def lacking(self, model: Model) -> set[str]:
+        """Equations in which a set has a remainder, or something was seen that is not confirmed."""
+        return self.unexplained | {u.removeprefix("remainder:") for u in model.units if u.startswith("remainder:")}
 
     def log_mass(self, units: Collection[str]) -> float:
         """Log mass of the sets that hold one of some units."""
