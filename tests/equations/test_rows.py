@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.io.rows import filled, of_rows, without_rows_twice
-from emafault.io.sensors import stalled
+from emafault.io.rows import filled, of_rows, stalled, without_rows_twice
 
 from .conftest import recorded
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from emafault.actuator.sensors import SensorNoise
-from emafault.io.sensors import stalled
+from emafault.io.rows import stalled
 
 from .conftest import NOISE, machine_of, recorded
 from .test_residuals import mean_squares, truth

@@ -16,7 +16,8 @@ from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of
 from ..io.lattice import lattice_step, spacing
 from ..io.motion import calm_motion
 from ..io.recording import Recording
-from ..io.sensors import bridged, cut_off, held, stalled, without_spikes
+from ..io.rows import stalled
+from ..io.sensors import bridged, cut_off, held, without_spikes
 from ..io.updates import across, updates
 from .dual import Dual
 

@@ -9,6 +9,7 @@ from .lattice import spacing
 from .recording import Recording
 from .updates import across, updates
 
+MOVING = 2.0  # rad/s, of a rotor that is not at rest
 MOTION = ("rotor_angle", "rotor_speed", "output_position")
 SPIKE = 10.0  # robust standard deviations of a second difference, or from a cubic
 AROUND, NEAR = 9, 4  # samples on either side of one in which counts or time may be lost, and those nearest

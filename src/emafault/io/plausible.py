@@ -18,6 +18,7 @@ import numpy as np
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
+from .motion import MOVING
 from .recording import PHASES, Recording
 from .scales import CERTAIN, current_scales, largest
 
@@ -36,7 +37,6 @@ LATE = 4  # column of the voltage equation
 LATEST = 5.0  # intervals that the angle may be late by
 MOST_POLE_PAIRS = 20  # that are tried where those told do not turn with the voltages
 LOST = 2.0 * np.pi / 3.0  # electrical rad from sample to sample; from here on a sample cannot be told its sector
-MOVING = 2.0  # rad/s
 FEWEST = 200  # samples in motion
 DECADE = 0.08  # of a decimal logarithm, by which a factor is taken for a power of ten
 SAME_DESIGN = 0.3  # by which what a file carries of its actuator may differ; gear and pole pairs may not

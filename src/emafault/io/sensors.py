@@ -1,6 +1,6 @@
 """Signals that contradict each other or their sensors: what refuses a recording, and what makes one useless."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
 
@@ -11,7 +11,7 @@ from ..actuator.parameters import ActuatorParameters
 from ..errors import InputError
 from .command import refuse_unfollowed
 from .lattice import lattice_step
-from .motion import AROUND, MOTION, SPIKE, calm_motion
+from .motion import MOTION, MOVING, SPIKE, calm_motion
 from .plausible import refuse_bus, refuse_frozen, refuse_implausible, refuse_other_actuator, refuse_unbalanced
 from .recording import PHASES, Recording
 from .scales import largest, speed_scale
@@ -21,7 +21,6 @@ SLOWEST_INTERVAL = 1e-3  # s
 LEAST_TRAVEL = 0.1  # rad of the rotor; less is standing still
 AT_REST = 5.0  # rad/s above what full current reaches from rest
 START_POSITION = 3e-3  # rad at the user shaft, from zero
-MOVING = 2.0  # rad/s
 CLIPPED_SHARE = 0.01  # of the samples in motion at one and the same extreme value
 CLIPPED_LEAST = 20
 CLIPPED_FINE = 4  # samples at one extreme, of a channel whose values otherwise never repeat
@@ -96,40 +95,6 @@ def refuse_mistaken(path: str, recording: Recording, actuator: ActuatorParameter
         _refuse_swapped_phases(path, recording, actuator)
         if whole:
             refuse_implausible(path, recording, actuator)
-
-
-def stalled(recording: Recording) -> np.ndarray:
-    """(sample,) bool: where the recorder stood still while the rotor turned: voltages, currents and angle repeat the
-    sample before to the last digit, and time went on, by the command or by the angle."""
-    out = np.zeros(len(recording.time), bool)
-    for before, last in repeats((recording.phase_voltage, recording.phase_current, recording.rotor_angle)):
-        command = went_on(recording.commanded_position, before, last)
-        out[before + 1 : last + 1] = command or (command is None and makes_up(recording.rotor_angle, before, last))
-    return out
-
-
-def repeats(channels: Sequence[np.ndarray]) -> list[tuple[int, int]]:
-    """The sample before and the last of each run of samples that repeat the one before in all channels."""
-    same = [(np.diff(x.reshape(len(x), -1), axis=0) == 0.0).all(axis=1) for x in channels]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.all(same, axis=0), [False]])))
-    return [(int(before), int(last)) for before, last in edges.reshape(-1, 2)]
-
-
-def went_on(command: np.ndarray, before: int, last: int) -> bool | None:
-    """Whether time went on from one sample to another by a command, which has no noise; None where it changes with few
-    samples around and does not tell."""
-    around = last - before + AROUND
-    inside = np.diff(command[before : last + 1])
-    beside = np.diff(command[max(0, before - around) : before + 1]), np.diff(command[last : last + around + 1])
-    if np.mean(np.concatenate(beside) != 0.0) <= 0.5:
-        return None
-    return bool(inside.any()) or makes_up(command, before, last)
-
-
-def makes_up(x: np.ndarray, before: int, last: int) -> bool:
-    """Whether a signal that has repeated samples up to the last makes up for them with the next."""
-    after = np.abs(np.diff(x[last + 1 : last + 1 + last - before + AROUND]))
-    return bool(len(after) and abs(x[last + 1] - x[last]) > (1.0 + 0.5 * (last - before)) * np.median(after))
 
 
 def held(recording: Recording) -> np.ndarray:
