@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from diagnosis import Case, simulate_bench
 from emafault import config
@@ -229,6 +230,29 @@ def late_by_recording(x: np.ndarray, n: int) -> np.ndarray:
     return before(x, np.full(len(x), 0.5 + 0.5 * each(n)))
 
 
+def dead(i: np.ndarray) -> np.ndarray:
+    """Currents of channels that are dead within 50 mA."""
+    return np.sign(i) * np.maximum(np.abs(i) - 0.05, 0.0)
+
+
+def half_waves(i: np.ndarray) -> np.ndarray:
+    """Currents of which phase a's channel has another gain in one direction."""
+    return i * (1.0 + 0.01 * (i > 0.0) * np.array([1.0, 0.0, 0.0]))
+
+
+def averaged(x: np.ndarray, over: int) -> np.ndarray:
+    """A signal averaged over a sample and some before."""
+    return uniform_filter1d(x, over, axis=0, origin=(over - 1) // 2, mode="nearest")
+
+
+def with_voltages_in_currents(r: Recording, n: int) -> Recording:
+    """Currents whose channels take up 0.5 mA a volt of their phase."""
+    return replace(
+        r, phase_current=r.phase_current + 5e-4 * r.phase_voltage,
+        phase_current_end=r.phase_current_end + 5e-4 * r.phase_voltage,
+    )  # fmt: skip
+
+
 CHANNELS = {
     "currents in steps of 20 mA": Channel(in_steps("current", 0.02), ("adc_step in sensor_current",)),
     "currents in steps of 50 mA": Channel(in_steps("current", 0.05), ("adc_step in sensor_current",)),
@@ -385,6 +409,22 @@ CHANNELS = {
     "machine warm of motions before": changed(
         "drift in electrical", ambient_temperature=lambda x, n: x - 3.0 * n
     ),
+    "currents of sensors dead within 50 mA": Channel(
+        entry("current", "sensor_curve", dead=0.05), ("sensor_curve in sensor_current",)
+    ),
+    "currents' channels dead within 50 mA": changed(
+        "sensor_curve in sensor_current", phase_current=lambda i, n: dead(i), phase_current_end=lambda i, n: dead(i)
+    ),
+    "half-waves of a current unlike": changed(
+        "sensor_curve in sensor_current",
+        phase_current=lambda i, n: half_waves(i), phase_current_end=lambda i, n: half_waves(i),
+    ),
+    "voltages in the currents": Channel(change=with_voltages_in_currents),
+    "currents averaged over three samples": changed(
+        "lag in sensor_current",
+        phase_current=lambda i, n: averaged(i, 3), phase_current_end=lambda i, n: averaged(i, 3),
+    ),
+    "speed averaged over nine samples": changed(rotor_speed=lambda w, n: averaged(w, 9)),
     "three faults at once": changed(
         "drift in sensor_current", "lag in sensor_voltage", "lag in sensor_output",
         phase_current=plus_on_b(0.02), phase_current_end=plus_on_b(0.02), phase_voltage=late(0.4),

@@ -80,6 +80,10 @@ def test_channels_faults(true):
     np.testing.assert_allclose((true["rotor_speed"][0] - passed)[at].mean(), 3.0 * rate[at].mean(), rtol=0.1)
     bent = changed(true, place="voltage", form="sensor_curve", bend=0.05)["phase_voltage"]
     np.testing.assert_allclose(bent, -0.05 * v * (v / 24.0) ** 2, atol=1e-12)
+    halves = changed(true, place="current_a", form="sensor_curve", halves=0.01)["phase_current"]
+    np.testing.assert_allclose(halves, 0.01 * np.outer(np.abs(i[:, 0]), [1, 0, 0]), atol=1e-12)
+    dead = changed(true, place="current", form="sensor_curve", dead=0.05)["phase_current"] + i
+    np.testing.assert_allclose(dead, np.sign(i) * np.maximum(np.abs(i) - 0.05, 0.0), atol=1e-12)
     less = changed(true, place="voltage", form="drop", drop=0.7, turn=0.05)["phase_voltage"]
     np.testing.assert_allclose(less, 0.7 * np.tanh(i / 0.05), atol=1e-12)
     one = changed(true, place="voltage_b", form="drop", drop=0.7, turn=0.05)["phase_voltage"]

@@ -199,6 +199,12 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
         ),
         ("~curve_voltage", {"curve.voltage": 0.02}, {"place": "voltage", "form": "sensor_curve", "bend": 0.02}),
         ("~curve_current", {"curve.current_c": 0.02}, {"place": "current_c", "form": "sensor_curve", "bend": 0.02}),
+        ("~curve_current", {"halves.current_a": 0.01}, {"place": "current_a", "form": "sensor_curve", "halves": 0.01}),
+        (
+            "~curve_current",
+            {"dead.current": 0.05, "dead.turn": 0.1},
+            {"place": "current", "form": "sensor_curve", "dead": 0.05},
+        ),
         (
             "~drop_voltage",
             {"drop.voltage_b": 0.4, "drop.turn": 0.1},

@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.equations.corrected import corrected, write_corrected
+from emafault.actuator.chain import Chain
+from emafault.actuator.parameters import RUN_DTYPE
+from emafault.equations.corrected import _straightened, corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
 from emafault.first_order import smoothed
 from emafault.io.recording import read_recording
 
-from .conftest import ACTUATOR, COGGING, NOISE, bench, recorded, verdict_of
+from .conftest import ACTUATOR, COGGING, NOISE, bench, machine_of, recorded, verdict_of
 
 NAMED = {"r0.nc": "parabolic", "r1.nc": "reversal", "r2.nc": "sine", "r3.nc": "parabolic"}
 
@@ -46,6 +48,45 @@ def test_smoothed_currents_are_told_and_undone():
     for name, r in undone.items():
         off = r.phase_current - true[name].phase_current
         assert np.std(off) < 0.1 * np.std(smooth[name].phase_current - true[name].phase_current)
+
+
+CURVES = [
+    ({"dead": 0.05}, {"dead.current": 0.05, "dead.turn": 0.1}, ("electrical_a", "electrical_c")),
+    ({"halves": 0.03}, {"halves.current": 0.03}, ("sensor_current", "electrical_a")),
+]
+
+
+@pytest.mark.parametrize(("entry", "values", "equations"), CURVES)
+def test_at_the_curve_of_its_currents_a_recording_leaves_its_noise(entry, values, equations):
+    plain = recorded("parabolic")
+    names = {n: getattr(plain, n).copy() for n in ("phase_current", "phase_current_end")}
+    chain = Chain([{"place": "current", "form": "sensor_curve"} | entry], np.zeros(1, RUN_DTYPE)[0], 1e-4, 0, 0, "")
+    chain.run["current_limit"] = ACTUATOR.current_limit
+    chain.before_noise(names)
+    bent = replace(plain, **names)
+    machine = machine_of({"a.nc": bent})
+    off = {n: p.off for n, p in machine.parameters.items()}
+
+    def left(at, recordings):
+        blocks = machine_of(recordings).blocks(off | at, "a.nc", wanted=())
+        return {b.equation: np.var(b.residual[b.usable]) for b in blocks}
+
+    without, undone, true = left({}, {"a.nc": bent}), left(values, {"a.nc": bent}), left({}, {"a.nc": plain})
+    for equation in equations:
+        added = without[equation] - true[equation]
+        assert added > 0.03 * true[equation] and undone[equation] - true[equation] < 0.2 * added, equation
+
+
+def test_a_curve_of_the_currents_is_undone():
+    plain = recorded("parabolic")
+    for kind, amount in (("dead", 0.05), ("halves", 0.03)):
+        i = plain.phase_current
+        seen = np.sign(i) * np.maximum(np.abs(i) - amount, 0.0) if kind == "dead" else i + amount * np.abs(i)
+        faulty = replace(plain, phase_current=seen)
+        bends = {kind: np.full(3, amount)}
+        got = _straightened(faulty, "current", bends, ACTUATOR.current_limit, 0.1).phase_current
+        flows = np.abs(i) > 0.5
+        assert np.abs((got - i)[flows]).max() < 0.05 * np.abs((seen - i)[flows]).max()
 
 
 @pytest.mark.long

@@ -151,7 +151,9 @@ class Chain:
         share = (np.arange(len(x)) + 0.5) / len(x)
         if form == "sensor_curve":
             full = self.run["current_limit"] if quantity == "current" else 0.5 * self.run["bus_voltage"]
-            x -= entry["bend"] * x * (x / full) ** 2
+            size = np.abs(x) - entry.get("dead", 0.0)
+            bend = entry.get("bend", 0.0) * x * (x / full) ** 2
+            x[...] = np.sign(x) * np.maximum(size, 0.0) + entry.get("halves", 0.0) * np.abs(x) - bend
         elif form == "lag":
             lag = entry["lag"]
             other = np.concatenate([x[:1], x[:-1]]) if lag > 0.0 else np.concatenate([x[1:], x[-1:]])

@@ -58,7 +58,8 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "exponent": (0.01, 10.0, "1"), "centre": (*ANY, "rad"), "width": (1e-3, 10.0, "rad"),
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
-    "bend": (-0.5, 0.5, "1 at full range"), "share": (0.0, 0.5, "1"), "scatter": (1e-9, 0.1, "s"),
+    "bend": (-0.5, 0.5, "1 at full range"), "halves": (-0.5, 0.5, "1"), "dead": (*ANY, ""),
+    "share": (0.0, 0.5, "1"), "scatter": (1e-9, 0.1, "s"),
     "late": (-100.0, 100.0, "recording intervals"), "rate": (-0.1, 0.1, "1"),
     "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
@@ -73,7 +74,8 @@ SHAPES = {
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
-    "sensor_curve": ("bend",), "gain": ("gain", "growth"), "drop": ("drop", "turn"), "crosstalk": ("source", "gain"),
+    "sensor_curve": ("bend", "halves", "dead"), "gain": ("gain", "growth"), "drop": ("drop", "turn"),
+    "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),
     "clock": ("scatter", "late", "rate"),
 }  # fmt: skip
@@ -87,10 +89,12 @@ OF_SHAPE = {"harmonics": tuple(f"h{n}" for n in ORDERS)}
 OF_WINDING = {"coefficient": tuple(f"{name}_{j}" for name in ("back_emf", "inductance") for j in PHASES)}
 FORMS = SHAPES | OF_CHANNELS | OF_CONTROLLER | OF_SHAPE | OF_WINDING
 #: parameters that may be left out: the phase of a wave in time is then another one in each run, a drift from nothing, a
-#: gain that stays, a harmonic that is not there, a coefficient that does not differ, what a clock does not do
+#: gain that stays, a harmonic that is not there, a coefficient that does not differ, what a clock does not do, in what
+#: way a curve is not bent
 OPTIONAL = {
     "frequency": ("phase",), "drift": ("at_start",), "gain": ("growth",), "harmonics": OF_SHAPE["harmonics"],
     "coefficient": OF_WINDING["coefficient"], "clock": OF_CHANNELS["clock"],
+    "sensor_curve": OF_CHANNELS["sensor_curve"],
 }  # fmt: skip
 #: an entry's values of single recordings, by name: they go before its own where that recording is replayed
 EACH = "recordings"

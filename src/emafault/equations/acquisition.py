@@ -186,20 +186,35 @@ def full_range(actuator: ActuatorParameters, channel: str) -> float:
     return 0.5 * actuator.bus_voltage if channel == "voltage" else actuator.current_limit
 
 
+#: parameter of a channel's curve, by the beginning of its name in the equations
+CURVES = {"curve": "bend", "halves": "halves", "dead": "dead"}
+
+
 def bent(p: Point, channel: str, phase: str, x: Dual | np.ndarray, actuator: ActuatorParameters) -> Dual:
-    """What a signal loses on a channel whose curve is bent: a share of it at full range, which goes with the cube.
+    """What a signal loses on a channel whose curve is bent: a share of it at full range, which goes with the cube; by
+    another gain in one direction a share of its size; by a dead band a current in its direction.
 
     All phases have it alike, or one its own.
     """
     plain = np.asarray(x.value if isinstance(x, Dual) else x)
-    cubic, full = None, full_range(actuator, channel)
     out = Dual(0.0)
-    for name in (f"curve.{channel}", f"curve.{channel}_{phase}"):
-        bend = p(name)
-        if bend.slopes or bend.value:
-            cubic = plain * np.square(plain / full) if cubic is None else cubic
-            out = out + bend * cubic
+    for kind in CURVES:
+        amounts = [a for c in (channel, f"{channel}_{phase}") if (a := p(f"{kind}.{c}")).slopes or a.value]
+        if amounts:
+            turn = p("dead.turn")
+            lost: Dual | np.ndarray = lost_by(kind, plain, full_range(actuator, channel), float(turn.value))
+            if kind == "dead":
+                lost = turn.through(np.asarray(lost), turning(plain, float(turn.value)))
+            for amount in amounts:
+                out = out + amount * lost
     return out
+
+
+def lost_by(kind: str, x: np.ndarray, full: float, turn: float) -> np.ndarray:
+    """What a signal loses by one of ``CURVES`` of amount one, from its size, its range and where it turns about."""
+    if kind == "curve":
+        return x * np.square(x / full)
+    return -np.abs(x) if kind == "halves" else direction(x, turn)
 
 
 def dropped(p: Point, phase: str, current: np.ndarray) -> Dual:

@@ -13,7 +13,7 @@ from ..actuator.grammar import EACH, PHASES
 from ..actuator.parameters import ActuatorParameters
 from ..diagnosis.described import Described
 from ..diagnosis.forms import FORMS, function, memory
-from .acquisition import GAIN_NAMES, RATE
+from .acquisition import CURVES, GAIN_NAMES, RATE
 from .coordinates import COEFFICIENTS
 from .parameters import BEYOND
 from .sensor_speed import SENSOR
@@ -113,8 +113,9 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
         ((pair, gain),) = values.items()
         return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})
     if kind == "curve":
-        ((place, bend),) = values.items()
-        return _rounded({"place": place, "form": "sensor_curve", "bend": bend})
+        ((full, amount),) = ((n, v) for n, (v, _) in linear.items() if n != "dead.turn")
+        bent, _, place = full.partition(".")
+        return _rounded({"place": place, "form": "sensor_curve", CURVES[bent]: amount})
     if kind == "drop":
         ((place, drop),) = ((n, v) for n, v in values.items() if n != "turn")
         return _rounded({"place": place, "form": "drop", "drop": drop, "turn": values["turn"]})

@@ -14,7 +14,7 @@ from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
 from ..resampled import before
 from ..switches import direction
-from .acquisition import CLOCKS, GAIN_NAMES, RATE, clock_names, drifting, full_range, rates, undone
+from .acquisition import CLOCKS, CURVES, GAIN_NAMES, RATE, clock_names, drifting, full_range, lost_by, rates, undone
 from .coordinates import COEFFICIENTS
 from .diagnose import Diagnosed
 from .point import Point
@@ -71,9 +71,13 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
             yield f"clock of the {of} logger", partial(_on_time, channels=channels, late=behind)
     for quantity in ("voltage", "current"):
         if f"~curve_{quantity}" in told:
-            bends = np.array([sum(values.get(f"curve.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
+            bends = {
+                k: np.array([sum(values.get(f"{k}.{c}", 0.0) for c in (quantity, f"{quantity}_{j}")) for j in "abc"])
+                for k in CURVES
+            }
             full = full_range(found.bench.machine.actuator, quantity)
-            yield f"curve of the {quantity} channels", partial(_straightened, quantity=quantity, bends=bends / full**2)
+            words, turn = f"curve of the {quantity} channels", values["dead.turn"]
+            yield words, partial(_straightened, quantity=quantity, bends=bends, full=full, turn=turn)
     if "~drop_voltage" in told:
         drops = np.array([sum(values.get(f"drop.{c}", 0.0) for c in ("voltage", f"voltage_{j}")) for j in "abc"])
         yield "drop of the switches", partial(_less_drop, drops=drops, turn=values["drop.turn"])
@@ -125,11 +129,14 @@ def _warmer(recording: Recording, by: float) -> Recording:
     return replace(recording, ambient_temperature=recording.ambient_temperature + by)
 
 
-def _straightened(recording: Recording, quantity: str, bends: np.ndarray) -> Recording:
-    """``bends`` (phase,) what is lost over the cube of the signal."""
+def _straightened(
+    recording: Recording, quantity: str, bends: Mapping[str, np.ndarray], full: float, turn: float
+) -> Recording:
+    """``bends`` (phase,) by kind of curve, of a channel's range; ``turn`` of a dead band (A)."""
     names = ("phase_voltage",) if quantity == "voltage" else ("phase_current", "phase_current_end")
     old = {n: x for n in names if (x := getattr(recording, n)) is not None}
-    return replace(recording, **{n: x + bends * x**3 for n, x in old.items()})
+    lost = {n: sum(amount * lost_by(k, x, full, turn) for k, amount in bends.items()) for n, x in old.items()}
+    return replace(recording, **{n: x + lost[n] for n, x in old.items()})
 
 
 def _over(recording: Recording, quantity: str, gains: np.ndarray) -> Recording:

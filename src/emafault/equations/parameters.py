@@ -26,6 +26,7 @@ TIMING = 0.5  # of a control period, by which samples and means within it may be
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
+DEAD = 0.005  # of the current limit, that a current sensor may be dead within
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
 FAR_OUT = 100.0  # of a channel's noise, for the scale of its offset
 WARM = 30.0  # K, by which a machine may not have the recorded ambient temperature
@@ -189,13 +190,18 @@ def measuring_chain(
         variants = [Variant([Parameter(f"crosstalk_{quantity}.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
         out.append(Unit(f"~crosstalk_{quantity}", "form", _shows(quantity), variants, among=2.0))
     at = TURN * a.current_limit
-    turn = Parameter("drop.turn", at, at, at, "A", vanishes=0.0)
-    curves = {"curve": (BEND, "1"), "drop": (DROP * a.bus_voltage, "V")}
-    for kind, channel in (("curve", "voltage"), ("curve", "current"), ("drop", "voltage")):
+    turns = {k: [Parameter(f"{k}.turn", at, at, at, "A", vanishes=0.0)] for k in ("drop", "dead")}
+    curves = {
+        "curve": (BEND, "1"), "halves": (BEND, "1"), "drop": (DROP * a.bus_voltage, "V"),
+        "dead": (DEAD * a.current_limit, "A"),
+    }  # fmt: skip
+    bends = {("curve", "voltage"): ("curve", "halves"), ("curve", "current"): ("curve", "halves", "dead")}
+    for (word, channel), kinds in (bends | {("drop", "voltage"): ("drop",)}).items():
         of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
-        also = [turn] if kind == "drop" else []
-        variants = [Variant([Parameter(f"{kind}.{c}", 0.0, 0.0, *curves[kind]), *also]) for c in of]
-        out.append(Unit(f"~{kind}_{channel}", "form", _shows(channel), variants, among=3.0))
+        variants = [
+            Variant([Parameter(f"{k}.{c}", 0.0, 0.0, *curves[k]), *turns.get(k, ())]) for k in kinds for c in of
+        ]
+        out.append(Unit(f"~{word}_{channel}", "form", _shows(channel), variants, among=3.0))
     return out + _drifts(a, recordings, reference)
 
 

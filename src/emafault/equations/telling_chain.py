@@ -7,7 +7,7 @@ from math import hypot
 from typing import Any
 
 from ..actuator.parameters import ActuatorParameters
-from .acquisition import GAIN_NAMES, RATE, full_range
+from .acquisition import CURVES, GAIN_NAMES, RATE, full_range
 from .sensor_speed import SENSOR
 from .telling import Z
 
@@ -100,13 +100,22 @@ def of_phase(quantity: str, phase: str) -> str:
 
 
 def _curve(fault: Fault) -> Told:
-    ((at, share),) = fault.values.items()
-    phase = at.partition("_")[2]
-    full = f"{full_range(fault.actuator, fault.channel):g} {'V' if fault.channel == 'voltage' else 'A'}"
+    ((at, amount),) = ((n, v) for n, v in fault.values.items() if n != "dead.turn")
+    kind, phase = at.partition(".")[0], at.partition("_")[2]
+    unit = "V" if fault.channel == "voltage" else "A"
     which = f"the recorded {of_phase(fault.channel, phase)} {'has' if phase else 'have'}"
-    side = "low" if share > 0.0 else "high"
-    says = f"{which} a cubic nonlinearity, {100.0 * abs(share):.2g} % too {side} at {full}"
-    return Told(says, "sensor_curve", "current" if fault.channel == "current" else "time", names={at: "bend"})
+    side = "low" if amount > 0.0 else "high"
+    if kind == "halves":
+        says = (
+            f"{which} a gain larger by {200.0 * abs(amount):.2g} % where {'positive' if amount > 0.0 else 'negative'}"
+        )
+    elif kind == "dead":
+        says = f"{which} a dead band: {abs(amount):.2g} {unit} too {side} in size"
+    else:
+        full = f"{full_range(fault.actuator, fault.channel):g} {unit}"
+        says = f"{which} a cubic nonlinearity, {100.0 * abs(amount):.2g} % too {side} at {full}"
+    along = "current" if fault.channel == "current" else "time"
+    return Told(says, "sensor_curve", along, names={at: CURVES[kind], "dead.turn": "turn"})
 
 
 def _drop(fault: Fault) -> Told:

@@ -131,6 +131,10 @@ def _of_group(group: str, short: str) -> str:
             for quantity in ("current", "voltage")
         },
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
+        "halves": f"{channel} channel{f' of phase {side}' if side else 's'}: half the difference of its gains",
+        "dead": "dead band of the current, turned about"
+        if short == "turn"
+        else f"{channel} channel{f' of phase {side}' if side else 's'}: dead band",
         "drop": f"drop of the switches{f' of phase {side}' if side else ''}{', turned about' * (short == 'turn')}",
         **{
             f"{kind}_{q}": f"{kind.replace(RATE, 'rate of drift')} of the {CHANNELS.get(q, q)} channel"
