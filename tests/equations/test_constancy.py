@@ -69,3 +69,12 @@ def test_a_remainder_says_what_it_looks_like_in_each_recording():
     assert said.endswith("it looks as if a spring acts on the user shaft, by another amount each time.")
     for other in (("torque", {"load_spring": -4.0}), ("bus", {"load_spring": 4.0})):
         assert "looks as if" not in remainder_sentence(search, *other)
+
+
+def test_a_remainder_that_is_one_of_several_forms_says_which():
+    search = SimpleNamespace(units={})
+    said = remainder_sentence(search, "torque", {}, ["a torque goes with the speed (48 %)", "a drag with time (45 %)"])
+    assert said == (
+        "The torque equation leaves more than noise: perhaps a torque goes with the speed (48 %), or a drag with time"
+        " (45 %)."
+    )

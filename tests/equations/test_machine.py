@@ -8,6 +8,7 @@ import pytest
 from emafault.actuator.shape import trapezoid_swept
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.linear import disturbance, raw_columns
+from emafault.diagnosis.sets import OTHER_FORM
 from emafault.effects import EFFECTS
 from emafault.equations import commutation, electrical, waveform
 from emafault.equations.coordinates import OWN_ALONG
@@ -203,3 +204,8 @@ def test_a_value_beyond_tolerance_lies_beyond_it_from_wherever_the_point_is(nomi
     for edge, value in zip(fit._hole(variant)[:, 0], (0.6, 1.4), strict=True):
         there = fit.after({"friction_level.scale": fit.prior("friction_level.scale")[2], name: off + edge * width})
         assert sum(there.values()) == pytest.approx(value)
+
+
+def test_a_unit_s_variants_are_no_other_forms():
+    machine = machine_of({"a.nc": recorded()})
+    assert max(len(u.variants) for u in machine.units) < OTHER_FORM

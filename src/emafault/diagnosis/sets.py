@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-OTHER_FORM = 10  # added to a variant's number, once for each kind of own form that the unit may take
+OTHER_FORM = 100  # added to a variant's number, once for each kind of own form that the unit may take
 WIDTHS = (1.0, 0.3, 0.1, 0.03)  # of an amplitude's prior over its range
 FORM_WIDTHS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of a described form's, whose range no catalogue gives
 REMAINDER_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # over the noise of a row

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
-from ..diagnosis.naming import Reading, possible_place, told_sets
+from ..diagnosis.naming import POSSIBLE, Reading, possible_place, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Search
 from ..diagnosis.sets import Model
@@ -171,61 +171,83 @@ def _which(fitted: Fitted, found: Sequence[Mapping]) -> list[dict[str, Any]]:
 
 def _discovered(fitted: Fitted) -> list[dict]:
     """Forms that no catalogue lists, and remainders, as the verdict tells them."""
-    bench, machine, fit, reading, model = fitted.bench, fitted.machine, fitted.fit, fitted.reading, fitted.leading
+    bench, fit, reading, model = fitted.bench, fitted.fit, fitted.reading, fitted.leading
     out = []
 
     @cache
     def partly(but: tuple[str, ...]) -> Reduced:
         return bench.reduce(fit.normal, but) if but else fit.search.reduced
 
-    described = {d.id: d for d in bench.described}
     for form in reading.forms:
-        unit = next(u for u in bench.units if u.id == form)
-        linear = {
-            p.name: (bench.after({p.name: model.deviations[p.name]})[p.name], model.spread[p.name])
-            for p in unit.parameters
-            if p.name in model.deviations
-        }
-        if form in described:
-            values = bench.point | {n: v for n, (v, _) in linear.items()}
-            blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
-            seen = curve(bench.machine, described[form], blocks, bench.carried, values)
-            entry = telling.told(described[form], linear, machine.actuator)
-            entry["curve"] = telling.picture(described[form], seen, machine.actuator)
-            entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
-        elif form.startswith(BEYOND):
-            effect = form.removeprefix(BEYOND)
-            found = _parameters(bench, machine, (effect,), model)
-            entry = told_of_tolerance(effect, unit.equations[0], found, bench.parameters)
-            entry["term"] = None  # a value of the unit's own, among those of the simulator
-        else:
-            units = {p.name: p.units for p in unit.parameters}
-            entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
-            lengths = {n: r.size * r.interval for n, r in bench.machine.recordings.items()}
-            entry["term"] = carried.of_chain(form, linear, lengths)
         out.append(
             {
                 "unit": form, "probability": float(reading.inclusion[form]), "closed": None,
                 "another_form_of": another_form_of(partly, fit.search, form, model.deviations),
-                "recordings": list(bench.recordings), **entry,
+                "recordings": list(bench.recordings), **_described(fitted, form, model),
             }
         )  # fmt: skip
     for left in reading.left:
         equation = left.split(":", 1)[1]
+        instead = [] if left in reading.remainders else _perhaps(fitted, equation)
         out.append(
             {
                 "unit": left, "equation": EQUATION.get(equation, equation), "along": "time", "form": "remainder",
                 "probability": float(reading.places[equation]), "closed": None,
                 "another_form_of": another_form_of(partly, fit.search, left, model.deviations), "parameters": {},
                 "recordings": list(bench.recordings),
-                "sentence": remainder_sentence(fit.search, equation, fitted.changes),
+                "sentence": remainder_sentence(fit.search, equation, fitted.changes, instead),
             }
         )  # fmt: skip
     return out
 
 
-def remainder_sentence(search: Search, equation: str, changes: Mapping[str, float]) -> str:
-    """What an equation leaves, and what it looks like in each recording, were it of one size in all."""
+def _described(fitted: Fitted, form: str, model: Model) -> dict[str, Any]:
+    """A form as a set has it: in words, with its parameters, and the entry of a simulation that it is."""
+    bench, machine = fitted.bench, fitted.machine
+    described = {d.id: d for d in bench.described}
+    unit = next(u for u in bench.units if u.id == form)
+    linear = {
+        p.name: (bench.after({p.name: model.deviations[p.name]})[p.name], model.spread[p.name])
+        for p in unit.parameters
+        if p.name in model.deviations
+    }
+    if form in described:
+        values = bench.point | {n: v for n, (v, _) in linear.items()}
+        blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
+        seen = curve(bench.machine, described[form], blocks, bench.carried, values)
+        entry = telling.told(described[form], linear, machine.actuator)
+        entry["curve"] = telling.picture(described[form], seen, machine.actuator)
+        entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
+    elif form.startswith(BEYOND):
+        effect = form.removeprefix(BEYOND)
+        found = _parameters(bench, machine, (effect,), model)
+        entry = told_of_tolerance(effect, unit.equations[0], found, bench.parameters)
+        entry["term"] = None  # a value of the unit's own, among those of the simulator
+    else:
+        units = {p.name: p.units for p in unit.parameters}
+        entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+        lengths = {n: r.size * r.interval for n, r in bench.machine.recordings.items()}
+        entry["term"] = carried.of_chain(form, linear, lengths)
+    return entry
+
+
+def _perhaps(fitted: Fitted, equation: str) -> list[str]:
+    """What an equation may leave, in words, with its probability: forms that are not sure, the likeliest first."""
+    reading, acts = fitted.reading, {u.id: u.equations[0] for u in fitted.bench.units if u.kind == "form"}
+    likely = {
+        u: p for u, p in reading.inclusion.items() if p > POSSIBLE and acts.get(u) == equation and u not in reading.told
+    }
+    out = []
+    for form in sorted(likely, key=lambda u: -likely[u]):
+        model = next(m for m in fitted.fit.models if form in m.units)
+        says = _described(fitted, form, model)["sentence"].partition(": ")[2].rstrip(".")
+        out.append(f"{says} ({100.0 * likely[form]:.0f} %)")
+    return out
+
+
+def remainder_sentence(search: Search, equation: str, changes: Mapping[str, float], instead: Sequence[str] = ()) -> str:
+    """What an equation leaves, and what it looks like in each recording, were it of one size in all; ``instead``:
+    descriptions of it that are not sure."""
     like = [
         TERMS[e].SENTENCE
         for e, odds in changes.items()
@@ -233,6 +255,8 @@ def remainder_sentence(search: Search, equation: str, changes: Mapping[str, floa
     ]
     where = f"The {EQUATION.get(equation, equation).replace('_', ' ')} equation leaves more than noise"
     said = f"{where}{' at the commutations' if equation == 'commutation' else ''}, not described further."
+    if instead:
+        said = f"{where}: perhaps {', or '.join(instead)}."
     if like:
         said += f" In each recording by itself it looks as if {', or '.join(like)}, by another amount each time."
     return said
