@@ -236,6 +236,7 @@ def test_faults_that_grow_hum_and_scale_are_told_and_undone():
         assert _off(undone, true, variable) < 0.2 * _off(faulty, true, variable), variable
 
 
+@pytest.mark.long
 def test_an_offset_that_warms_up_is_told_and_undone():
     """It had been told as a step beside a function of one kind and another."""
     true = bench(COGGING)
@@ -281,6 +282,7 @@ def test_a_scale_that_the_controller_sees_too_is_told_from_one_of_the_recorder()
     assert "the controller sees it so" in told["sentence"]
 
 
+@pytest.mark.long
 def test_an_angle_that_is_homed_anew_for_each_recording_is_told_and_undone():
     """It had been a logger of the angle that is late by another amount in each, beside a remainder of the control."""
     true, faulty = bench(COGGING), {}

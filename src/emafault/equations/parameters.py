@@ -196,6 +196,8 @@ def measuring_chain(
         "dead": (DEAD * a.current_limit, "A"),
     }  # fmt: skip
     bends = {("curve", "voltage"): ("curve", "halves"), ("curve", "current"): ("curve", "halves", "dead")}
+    if any(r.current_step > 0.0 for r in recordings.values()):  # where a step takes small currents for none as well
+        bends["curve", "current"] = ("curve",)
     for (word, channel), kinds in (bends | {("drop", "voltage"): ("drop",)}).items():
         of = (channel, *(f"{channel}_{j}" for j in PER_PHASE))
         variants = [
