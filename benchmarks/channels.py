@@ -230,12 +230,12 @@ def late_by_recording(x: np.ndarray, n: int) -> np.ndarray:
     return before(x, np.full(len(x), 0.5 + 0.5 * each(n)))
 
 
-def dead(i: np.ndarray) -> np.ndarray:
+def dead(i: np.ndarray, n: int) -> np.ndarray:
     """Currents of channels that are dead within 50 mA."""
     return np.sign(i) * np.maximum(np.abs(i) - 0.05, 0.0)
 
 
-def half_waves(i: np.ndarray) -> np.ndarray:
+def half_waves(i: np.ndarray, n: int) -> np.ndarray:
     """Currents of which phase a's channel has another gain in one direction."""
     return i * (1.0 + 0.01 * (i > 0.0) * np.array([1.0, 0.0, 0.0]))
 
@@ -413,11 +413,10 @@ CHANNELS = {
         entry("current", "sensor_curve", dead=0.05), ("sensor_curve in sensor_current",)
     ),
     "currents' channels dead within 50 mA": changed(
-        "sensor_curve in sensor_current", phase_current=lambda i, n: dead(i), phase_current_end=lambda i, n: dead(i)
+        "sensor_curve in sensor_current", phase_current=dead, phase_current_end=dead
     ),
     "half-waves of a current unlike": changed(
-        "sensor_curve in sensor_current",
-        phase_current=lambda i, n: half_waves(i), phase_current_end=lambda i, n: half_waves(i),
+        "sensor_curve in sensor_current", phase_current=half_waves, phase_current_end=half_waves
     ),
     "voltages in the currents": Channel(change=with_voltages_in_currents),
     "currents averaged over three samples": changed(

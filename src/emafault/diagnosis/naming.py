@@ -83,12 +83,13 @@ def read(
     named = tuple(sorted(e for e, p in inclusion.items() if p >= NAMED and kind.get(e, "structural") in LISTED))
     open_ = [e for e in inclusion if kind.get(e) in LISTED and e not in named]
     groups = _groups(models, weights, open_, inclusion, {u.id: u.equations if one_equation else ("",) for u in units})
-    inclusion |= {e: p for same in _same(units) for e, p in _either(models, weights, same).items()}
+    alike = _same(units)
+    inclusion |= {e: p for same in alike for e, p in _either(models, weights, same).items()}
     present = [e for e, p in inclusion.items() if p >= PRESENT and kind.get(e) == "form"]
     forms = tuple(sorted(e for e in present if max(inclusion[e], _or_left(models, weights, e, acts[e])) >= NAMED))
     of_controller = {u.id for u in units if u.of_controller}
     # a form that is not told is no explanation, and no sign that there is nothing
-    known = {e for same in _same(units) if same & set(forms) for e in same} | set(forms)
+    known = {e for same in alike if same & set(forms) for e in same} | set(forms)
     undescribed = {u.id for u in units if u.kind == "form"} - known - of_controller
     remainders = tuple(sorted(e for e, p in inclusion.items() if p >= PRESENT and e.startswith("remainder:")))
     left_over = undescribed | {u for u in inclusion if _is_left(u, kind)}

@@ -201,31 +201,45 @@ def _discovered(fitted: Fitted) -> list[dict]:
     return out
 
 
-def _described(fitted: Fitted, form: str, model: Model) -> dict[str, Any]:
-    """A form as a set has it: in words, with its parameters, and the entry of a simulation that it is."""
-    bench, machine = fitted.bench, fitted.machine
-    described = {d.id: d for d in bench.described}
+def _linear(bench: Bench, form: str, model: Model) -> dict[str, tuple[float, float]]:
+    """Coefficients of a form as a set has them, and their standard deviations, by name."""
     unit = next(u for u in bench.units if u.id == form)
-    linear = {
+    return {
         p.name: (bench.after({p.name: model.deviations[p.name]})[p.name], model.spread[p.name])
         for p in unit.parameters
         if p.name in model.deviations
     }
+
+
+def _in_words(fitted: Fitted, form: str, model: Model) -> dict[str, Any]:
+    """A form as a set has it: where it is, with its parameters and a sentence."""
+    bench, machine, linear = fitted.bench, fitted.machine, _linear(fitted.bench, form, model)
+    described = {d.id: d for d in bench.described}
+    unit = next(u for u in bench.units if u.id == form)
+    if form in described:
+        return telling.told(described[form], linear, machine.actuator)
+    if form.startswith(BEYOND):
+        effect = form.removeprefix(BEYOND)
+        found = _parameters(bench, machine, (effect,), model)
+        return told_of_tolerance(effect, unit.equations[0], found, bench.parameters)
+    units = {p.name: p.units for p in unit.parameters}
+    return told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
+
+
+def _described(fitted: Fitted, form: str, model: Model) -> dict[str, Any]:
+    """The same, with the curve of one that a scan has proposed and the entry of a simulation that it is."""
+    bench, machine, linear = fitted.bench, fitted.machine, _linear(fitted.bench, form, model)
+    described = {d.id: d for d in bench.described}
+    entry = _in_words(fitted, form, model)
     if form in described:
         values = bench.point | {n: v for n, (v, _) in linear.items()}
         blocks = [b for r in bench.recordings for b in bench.machine.blocks(values, r, wanted=())]
         seen = curve(bench.machine, described[form], blocks, bench.carried, values)
-        entry = telling.told(described[form], linear, machine.actuator)
         entry["curve"] = telling.picture(described[form], seen, machine.actuator)
         entry["term"] = carried.of_form(described[form], linear, list(bench.recordings), machine.actuator)
     elif form.startswith(BEYOND):
-        effect = form.removeprefix(BEYOND)
-        found = _parameters(bench, machine, (effect,), model)
-        entry = told_of_tolerance(effect, unit.equations[0], found, bench.parameters)
         entry["term"] = None  # a value of the unit's own, among those of the simulator
     else:
-        units = {p.name: p.units for p in unit.parameters}
-        entry = told_of_chain(form, unit.equations[0], linear, units, machine.actuator)
         lengths = {n: r.size * r.interval for n, r in bench.machine.recordings.items()}
         entry["term"] = carried.of_chain(form, linear, lengths)
     return entry
@@ -240,7 +254,7 @@ def _perhaps(fitted: Fitted, equation: str) -> list[str]:
     out = []
     for form in sorted(likely, key=lambda u: -likely[u]):
         model = next(m for m in fitted.fit.models if form in m.units)
-        says = _described(fitted, form, model)["sentence"].partition(": ")[2].rstrip(".")
+        says = _in_words(fitted, form, model)["sentence"].partition(": ")[2].rstrip(".")
         out.append(f"{says} ({100.0 * likely[form]:.0f} %)")
     return out
 
