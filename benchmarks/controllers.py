@@ -8,22 +8,18 @@ of the machine: printed for each is what was named, what was told beside it, and
 """
 
 import argparse
-import os
-import shutil
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import patched
 from channels import EFFECTS, SPEC
 from emafault.actuator.parameters import ActuatorParameters
 from emafault.diagnosis.naming import NAMED
 from emafault.equations.run import diagnose_bench
 from emafault.io.bench import read_bench
 
-ROOT = Path(__file__).resolve().parent.parent
-LAW = Path("src/emafault/actuator/instants.py")
+LAW = "src/emafault/actuator/instants.py"
 SIMULATE = """
 import sys
 from pathlib import Path
@@ -94,22 +90,6 @@ LAWS = {
 }  # fmt: skip
 
 
-def simulate(law: Law, folder: Path, into: Path) -> None:
-    """Simulate the benches of a law into a folder, with a copy of the simulator in another one."""
-    shutil.copytree(ROOT / "src", folder / "src", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(ROOT / "benchmarks", folder / "benchmarks")
-    shutil.copytree(ROOT / "conf", folder / "conf")
-    text = (folder / LAW).read_text()
-    head, tick = text.split("def control_tick", 1)
-    for old, new in law.changes:
-        if tick.count(old) != 1:
-            raise SystemExit(f"{LAW}: has {old.strip()!r} {tick.count(old)} times, expected is once")
-        tick = tick.replace(old, new)
-    (folder / LAW).write_text(f"{head}def control_tick{tick}")
-    paths = {"PYTHONPATH": str(folder / "src"), "NUMBA_CACHE_DIR": str(folder / "compiled")}
-    subprocess.run([sys.executable, "-c", SIMULATE, str(into)], cwd=folder, env=os.environ | paths, check=True)
-
-
 def main() -> None:
     """Simulate, diagnose, print a line a bench and how many are right."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -117,8 +97,8 @@ def main() -> None:
     args = parser.parse_args()
     right = wrong = count = 0
     for name in args.only:
-        with tempfile.TemporaryDirectory() as copy, tempfile.TemporaryDirectory() as benches:
-            simulate(LAWS[name], Path(copy), Path(benches))
+        with tempfile.TemporaryDirectory() as benches:
+            patched.run(SIMULATE, LAW, LAWS[name].changes, benches)
             for effect in EFFECTS:
                 bench = read_bench(Path(benches) / effect, ActuatorParameters(**SPEC["actuator"]))
                 verdict = diagnose_bench(bench, SPEC).verdict
