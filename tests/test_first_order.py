@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from emafault.first_order import ahead, smoothed
+from emafault.first_order import ahead, averaged, averaging, smoothed
 
 SIGNAL = np.cumsum(np.random.default_rng(0).normal(size=400))
 BEFORE = np.concatenate([SIGNAL[:1], SIGNAL[:-1]])
@@ -25,3 +25,17 @@ def test_about_one_half_a_lag_is_nearly_undone():
 def test_smoothing_is_what_its_equation_says():
     out = smoothed(SIGNAL, 0.7)
     np.testing.assert_allclose(out[1:] + 0.7 * np.diff(out), SIGNAL[1:], atol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 0.5, 1.0, 2.2, 4.0])
+def test_an_average_is_late_by_its_delay(delay):
+    line = np.arange(50.0)
+    np.testing.assert_allclose(averaged(line, delay)[10:], line[10:] - delay, atol=1e-12)
+    weights = averaging(delay)
+    assert weights.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(averaged(SIGNAL, delay)[10:], np.convolve(SIGNAL, weights)[10 : len(SIGNAL)], atol=1e-9)
+
+
+def test_an_average_over_whole_numbers_of_samples():
+    np.testing.assert_allclose(averaged(SIGNAL, 1.0)[2:], np.convolve(SIGNAL, np.full(3, 1 / 3), "valid"), atol=1e-9)
+    assert averaged(SIGNAL, 1.0)[0] == SIGNAL[0]

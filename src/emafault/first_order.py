@@ -1,4 +1,4 @@
-"""First-order filters along a signal."""
+"""First-order filters along a signal, and its average over samples."""
 
 import numpy as np
 
@@ -62,6 +62,34 @@ def filtered(x: np.ndarray, constant: float) -> np.ndarray:
     at_end = x[0] + followed(x - x[0], 1.0 - decay, decay)
     before = np.concatenate([x[:1], at_end[:-1]])
     return x + (before - x) * (constant * (1.0 - decay))
+
+
+def averaged(x: np.ndarray, delay: float) -> np.ndarray:
+    """Means of each value and those before, (sample,), the first one before all; ``delay`` (intervals) is half of one
+    less than their number, and half-way between two numbers it is half of both."""
+    weights = averaging(delay)
+    before = np.concatenate([np.full(len(weights) - 1, x[0]), x])
+    sums = np.concatenate([[0.0], np.cumsum(before - x[0])])
+    out = np.full(len(x), x[0])
+    for weight, count in _numbers(delay):
+        first = len(weights) - count
+        out += weight / count * (sums[len(weights) :] - sums[first : first + len(x)])
+    return out
+
+
+def averaging(delay: float) -> np.ndarray:
+    """(interval,) weights of :func:`averaged`, of the latest value first."""
+    out = np.zeros(max(count for _, count in _numbers(delay)))
+    for weight, count in _numbers(delay):
+        out[:count] += weight / count
+    return out
+
+
+def _numbers(delay: float) -> list[tuple[float, int]]:
+    """Weights of the averages over one number of samples and over one more."""
+    fewer = int(2.0 * delay)
+    share = 2.0 * delay - fewer
+    return [(1.0 - share, fewer + 1), (share, fewer + 2)]
 
 
 def response(constant: float) -> np.ndarray:

@@ -78,6 +78,8 @@ def test_channels_faults(true):
     at = slice(500, 900)  # of a steady acceleration: late by the time constant
     rate = np.gradient(true["rotor_speed"][0])
     np.testing.assert_allclose((true["rotor_speed"][0] - passed)[at].mean(), 3.0 * rate[at].mean(), rtol=0.1)
+    mean = changed(true, place="speed", form="averaging", samples=5.0)["rotor_speed"] + true["rotor_speed"][0]
+    np.testing.assert_allclose(mean[4:], np.convolve(true["rotor_speed"][0], np.full(5, 0.2), "valid"), atol=1e-9)
     bent = changed(true, place="voltage", form="sensor_curve", bend=0.05)["phase_voltage"]
     np.testing.assert_allclose(bent, -0.05 * v * (v / 24.0) ** 2, atol=1e-12)
     halves = changed(true, place="current_a", form="sensor_curve", halves=0.01)["phase_current"]
@@ -128,8 +130,8 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "lag", "smoothing", "low_pass", "sensor_curve", "gain", "drop", "drift", "clipping", "adc_step",
-        "held", "hold", "spikes", "clock",
+        "crosstalk", "lag", "smoothing", "low_pass", "averaging", "sensor_curve", "gain", "drop", "drift", "clipping",
+        "adc_step", "held", "hold", "spikes", "clock",
     }  # fmt: skip
 
 

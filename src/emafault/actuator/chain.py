@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..first_order import filtered, smoothed
+from ..first_order import averaged, filtered, smoothed
 from ..resampled import before
 from ..switches import direction
 from .grammar import CONTROLLER, FACTORS, IN_RUN, LOGGERS, MACHINE, PHASES, SHAPES, of_recording
@@ -24,8 +24,9 @@ RECORDED = {
     "angle": ("rotor_angle",), "output": ("output_position",), "bus": ("bus_voltage",),
 }  # fmt: skip
 RECORDED |= {of: tuple(n for c in channels for n in RECORDED[c]) for of, channels in LOGGERS.items()}
-#: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter
-LATE = ("lag", "smoothing", "low_pass")
+#: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter, by an
+#: average over samples
+LATE = ("lag", "smoothing", "low_pass", "averaging")
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
 #: of the forms, shapes first
 ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "clock", "drift", *AFTER_NOISE)
@@ -161,6 +162,8 @@ class Chain:
         elif form in ("smoothing", "low_pass"):
             through = smoothed if form == "smoothing" else filtered
             x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
+        elif form == "averaging":
+            x[...] = np.apply_along_axis(averaged, 0, x, 0.5 * (entry["samples"] - 1.0))
         elif form == "gain":
             gain = entry["gain"] + entry.get("growth", 0.0) * share
             x *= 1.0 + (gain[:, None] if x.ndim == 2 else gain)

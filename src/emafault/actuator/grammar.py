@@ -59,7 +59,7 @@ PARAMETERS: dict[str, tuple[float, float, str]] = {
     "time_constant": (1e-4, 1e6, "s"), "length": (1e-3, 1e6, "rad"), "lag": (-1.0, 1.0, "recording intervals"),
     "delay": (0.0, 100.0, "recording intervals"), "every": (2.0, 200.0, "recording intervals"),
     "bend": (-0.5, 0.5, "1 at full range"), "halves": (-0.5, 0.5, "1"), "dead": (*ANY, ""),
-    "share": (0.0, 0.5, "1"), "scatter": (1e-9, 0.1, "s"),
+    "share": (0.0, 0.5, "1"), "samples": (1.0, 200.0, "1"), "scatter": (1e-9, 0.1, "s"),
     "late": (-100.0, 100.0, "recording intervals"), "rate": (-0.1, 0.1, "1"),
     "from": (*ANY, ""), "to": (*ANY, ""),
 }  # fmt: skip
@@ -74,6 +74,7 @@ SHAPES = {
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
+    "averaging": ("samples",),
     "sensor_curve": ("bend", "halves", "dead"), "gain": ("gain", "growth"), "drop": ("drop", "turn"),
     "crosstalk": ("source", "gain"),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),

@@ -3,6 +3,7 @@
 A channel that lags records (1 - lag) x[n] + lag x[n - 1] of a true signal x. One that smooths by a memory m, as a
 logger may, records y with y[n] + m (y[n] - y[n - 1]) = x[n]. One behind an analogue first-order filter of time constant
 T has y + T dy/dt = x, of which the mean over an interval is exact where the filtered signal at its ends is recorded.
+One that averages records means of samples, which lose what cannot be had back: such a signal is predicted, not undone.
 """
 
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..actuator.grammar import LOGGERS
 from ..actuator.parameters import ActuatorParameters
-from ..first_order import LEAST, ahead, filtered, response, smoothed
+from ..first_order import LEAST, ahead, averaged, averaging, filtered, response, smoothed
 from ..switches import direction, turning
 from .dual import Dual
 from .point import Point, effect_name
@@ -47,26 +48,37 @@ def advanced(x: np.ndarray) -> np.ndarray:
     return out
 
 
-def _late(p: Point, channel: str, phase: str) -> tuple[Dual, Dual, Dual, Dual]:
-    """Intervals by which a channel comes late and early, is smoothed and filtered, with what a phase has of its own."""
+class Late(NamedTuple):
+    """Intervals by which a channel comes late and early, is smoothed, filtered and averaged."""
+
+    late: Dual
+    early: Dual
+    smooth: Dual
+    constant: Dual
+    average: Dual
+
+
+def _late(p: Point, channel: str, phase: str) -> Late:
+    """With what a phase has of its own."""
 
     def of(way: str) -> Dual:
         all_alike = p(f"lag.{channel}_{way}")
         own = p(f"lag.{channel}_{phase}_{way}") if phase and way in OF_ONE_PHASE else Dual(0.0)
         return all_alike + own if own.slopes or own.value else all_alike
 
-    return of("late"), of("early"), of("smoothed"), of("filtered")
+    return Late(of("late"), of("early"), of("smoothed"), of("filtered"), of("averaged"))
 
 
 def recorded_late(p: Point, channel: str, x: Dual, size: int, phase: str = "") -> Dual:
-    """What is recorded of a true signal on a channel that lags (in intervals, either sign), smooths or filters."""
-    late, early, smooth, constant = _late(p, channel, phase)
+    """What is recorded of a true signal on a channel that lags (in intervals, either sign), smooths, filters or
+    averages."""
+    late, early, smooth, constant, average = _late(p, channel, phase)
     out = x
     if late.slopes or late.value:
         out = out + late * _changed(x, delayed, late, size)
     if early.slopes or early.value:
         out = out + early * _changed(x, advanced, early, size)
-    for amount, operate in ((smooth, smoothed), (constant, filtered)):
+    for amount, operate in ((smooth, smoothed), (constant, filtered), (average, averaged)):
         if amount.slopes or amount.value > LEAST:
             out = through(out, operate, amount, size)
     skew = p(f"skew.{channel}@{p.recording}")
@@ -107,9 +119,9 @@ def as_before(x: np.ndarray, late: Dual, channel: str) -> Dual:
 
 
 def response_of(p: Point, channel: str) -> np.ndarray:
-    """(interval,) what a channel that lags or filters records of one interval of one."""
-    late, early, _, constant = (float(x.value) for x in _late(p, channel, ""))
-    shifted = np.convolve([1.0 - late, late], [early, 1.0 - early])
+    """(interval,) what a channel that lags, filters or averages records of one interval of one."""
+    late, early, _, constant, average = (float(x.value) for x in _late(p, channel, ""))
+    shifted = np.convolve(np.convolve([1.0 - late, late], [early, 1.0 - early]), averaging(average))
     return np.convolve(shifted, response(constant)) if constant > LEAST else shifted
 
 
@@ -132,17 +144,18 @@ def _changed(x: Dual, operate: Callable[[np.ndarray], np.ndarray], lag: Dual, si
 
 
 def late_by(p: Point, channel: str) -> Dual:
-    """By how many intervals what changes slowly is recorded late on a channel that lags, smooths or filters."""
-    late, early, smooth, constant = _late(p, channel, "")
-    return late - early + smooth + constant
+    """By how many intervals what changes slowly is recorded late on a channel that lags, smooths, filters or
+    averages."""
+    late, early, *others = _late(p, channel, "")
+    return late - early + sum(others, Dual(0.0))
 
 
 def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str = "") -> Dual:
-    """The true signal from one recorded on a channel that lags, smooths or filters.
+    """The true signal from one recorded on a channel that lags, smooths or filters; from one that averages, on time.
 
     ``rate``: change of the recorded signal over an interval, of what is a mean over it from its start to its end.
     """
-    late, early, smooth, constant = _late(p, channel, phase)
+    late, early, smooth, constant, average = _late(p, channel, phase)
     out = Dual(x)
     if late.slopes or late.value > LEAST:
         out = out + _ahead(x, late)
@@ -150,8 +163,9 @@ def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str =
         out = out + _ahead(x[::-1], early).linear(lambda y: y[::-1], len(x))
     if smooth.slopes or smooth.value:
         out = out - smooth * delayed(x)
-    if constant.slopes or constant.value:
-        out = out + constant * rate
+    for delay in (constant, average):
+        if delay.slopes or delay.value:
+            out = out + delay * rate
     skew = p(f"skew.{channel}@{p.recording}")
     if skew.slopes or skew.value:
         out = out + skew * (0.5 * (advanced(x) - delayed(x)))

@@ -101,6 +101,8 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
         late, _, way = name.rpartition("_")
         if late == SENSOR:  # a channel of the recorder does not make what the controller sees too: see ``of_sensor``
             return None
+        if way == "averaged":
+            return _rounded({"place": channel, "form": "averaging", "samples": 1.0 + 2.0 * amount})
         if way in SMOOTH:
             return _rounded({"place": channel, "form": SMOOTH[way], "delay": amount})
         return _rounded({"place": channel, "form": "lag", "lag": -amount if way == "early" else amount})

@@ -24,7 +24,8 @@ SHARED = 0.5  # of the variance of seeded faults, that all seeded recordings hav
 ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
-MADE = ("smoothed", "filtered")  # ways of coming late that someone has chosen, none of them less than that
+#: ways of coming late that someone has chosen, with what is the least; an average is over two samples at least
+MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "averaged": 0.5}
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DEAD = 0.005  # of the current limit, that a current sensor may be dead within
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
@@ -166,17 +167,22 @@ def measuring_chain(
     """
     out = []
     phases = [f"{quantity}_{j}" for quantity in ("voltage", "current") for j in PER_PHASE]
-    # an angle is a sample, and no mean that a logger smooths
-    only = {"speed": ("late", "early", "filtered"), "angle": ("late", "early")}
+    # an angle is a sample, and no mean that a logger smooths; of currents the equations take what is recorded, which
+    # an average cannot be undone to
+    only = {
+        "speed": ("late", "early", "filtered", "averaged"), "angle": ("late", "early"),
+        "current": ("late", "early", "smoothed", "filtered"),
+    }  # fmt: skip
     only |= dict.fromkeys(phases, acquisition.OF_ONE_PHASE)
     # the controller takes the speed behind its sensor; that this one filters is in the catalogue, and by less than an
     # interval a record does not tell a delay from a filter
     filters = "speed_latency" not in lacking
     channels = ("voltage", "current", "output", "speed", "angle", "bus_voltage", *phases)
     for channel in channels:
-        ways = only.get(channel, ("late", "early", "smoothed", "filtered"))
+        ways = only.get(channel, ("late", "early", *MADE))
         variants = [_late(channel, way) for way in ways]
         if channel == "speed":
+            variants += [_late(SENSOR, "averaged")]
             variants += (
                 [_late(SENSOR, "late", 1.0)] if filters else [_late(SENSOR, way) for way in ("late", "filtered")]
             )
@@ -225,7 +231,7 @@ def _clocks(recordings: Collection[str]) -> list[Unit]:
 
 def _late(channel: str, way: str, least: float = 0.0) -> Variant:
     """A way in which a channel comes late, or early, by at least so many intervals."""
-    least = max(least, LEAST_LAG if way in MADE else 0.0)
+    least = max(least, MADE.get(way, 0.0))
     parameter = Parameter(f"lag.{channel}_{way}", 0.0, 0.0, 1.0, "interval")
     return Variant([parameter], [1], max(least, LEAST_LAG), [least] if least else ())
 

@@ -12,8 +12,10 @@ from .sensor_speed import SENSOR
 from .telling import Z
 
 LATE = {
-    "late": "comes late by {}", "early": "comes early by {}", "smoothed": "is smoothed with a memory of {}",
-    "filtered": "is behind a first-order filter with a time constant of {}",
+    "late": "comes late by {late:.2g} intervals", "early": "comes early by {late:.2g} intervals",
+    "smoothed": "is smoothed with a memory of {late:.2g} intervals",
+    "filtered": "is behind a first-order filter with a time constant of {late:.2g} intervals",
+    "averaged": "is averaged over {samples:.2g} samples, and comes late by {late:.2g} intervals",
 }  # fmt: skip
 CHANNELS = {
     "output": "output position",
@@ -231,7 +233,8 @@ def _lag(fault: Fault) -> Told:
     ((at, amount),) = fault.values.items()
     channel, _, way = at.partition(".")[2].rpartition("_")
     also = ", and the controller sees it so" * (channel == SENSOR)
-    return Told(f"the {fault.whose} {LATE[way].format(f'{amount:.2g} intervals')}{also}", "lag")
+    says = LATE[way].format(late=amount, samples=1.0 + 2.0 * amount)
+    return Told(f"the {fault.whose} {says}{also}", "lag")
 
 
 def _clock(fault: Fault) -> Told:
