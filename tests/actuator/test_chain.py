@@ -66,6 +66,10 @@ def test_channels_faults(true):
     np.testing.assert_allclose(talk["phase_current_end"][:, 0], 0.1 * true["phase_current_end"][0, :, 1], atol=1e-12)
     talk = changed(true, place="voltage_c", form="crosstalk", source="b", gain=0.1)["phase_voltage"]
     np.testing.assert_allclose(talk, 0.1 * np.outer(v[:, 1], [0, 0, 1]), atol=1e-12)
+    picked = changed(true, place="current", form="pickup", gain=1e-3)
+    np.testing.assert_allclose(picked["phase_current_end"], 1e-3 * v, atol=1e-12)
+    one = changed(true, place="current_b", form="pickup", gain=1e-3)["phase_current"]
+    np.testing.assert_allclose(one, 1e-3 * v * [0.0, 1.0, 0.0], atol=1e-12)
     late = changed(true, place="voltage", form="lag", lag=0.3)["phase_voltage"]
     np.testing.assert_allclose(late[1:], 0.3 * (v[:-1] - v[1:]), atol=1e-12)
     early = changed(true, place="output", form="lag", lag=-1.0)["output_position"]
@@ -130,8 +134,8 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "lag", "smoothing", "low_pass", "averaging", "sensor_curve", "gain", "drop", "drift", "clipping",
-        "adc_step", "held", "hold", "spikes", "clock",
+        "crosstalk", "pickup", "lag", "smoothing", "low_pass", "averaging", "sensor_curve", "gain", "drop", "drift",
+        "clipping", "adc_step", "held", "hold", "spikes", "clock",
     }  # fmt: skip
 
 

@@ -163,6 +163,11 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
             {"place": "current_a", "form": "crosstalk", "source": "b", "gain": 0.05},
         ),
         (
+            "~crosstalk_current",
+            {"pickup.current_b": 5e-4},
+            {"place": "current_b", "form": "pickup", "gain": 5e-4},
+        ),
+        (
             "~crosstalk_voltage",
             {"crosstalk_voltage.cb": 0.05},
             {"place": "voltage_c", "form": "crosstalk", "source": "b", "gain": 0.05},

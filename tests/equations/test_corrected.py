@@ -8,7 +8,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from emafault.equations.corrected import corrected
-from emafault.first_order import filtered
+from emafault.first_order import averaged, filtered
 
 from .conftest import ACTUATOR, recorded
 
@@ -21,6 +21,7 @@ MADE = {
     "late": (late, {"lag.speed_late": 0.4}, 0.05),
     "late in the sensor": (late, {"lag.speed_sensor_late": 0.4}, 0.05),
     "filtered": (lambda x: filtered(x, 3.0), {"lag.speed_filtered": 3.0}, 0.1),
+    "averaged": (lambda x: averaged(x, 3.0), {"lag.speed_averaged": 3.0}, 0.1),
 }
 
 
@@ -37,6 +38,19 @@ def test_a_lag_of_the_speed_is_undone(case):
     inside = slice(20, -20)
     off = [np.std((r.rotor_speed - smooth)[inside]) for r in (undone["a.nc"], faulty["a.nc"])]
     assert off[0] < left * off[1]
+
+
+def test_what_currents_pick_up_is_undone():
+    plain = recorded("sine")
+    more = 1e-3 * plain.phase_voltage + np.outer(2e-3 * plain.phase_voltage[:, 1], [0.0, 1.0, 0.0])
+    ends = None if plain.phase_current_end is None else plain.phase_current_end + more
+    faulty = replace(plain, phase_current=plain.phase_current + more, phase_current_end=ends)
+    bench = SimpleNamespace(described=(), machine=SimpleNamespace(actuator=ACTUATOR))
+    values = {"pickup.current": 1e-3, "pickup.current_b": 2e-3}
+    found = SimpleNamespace(verdict={"discovered": [{"unit": "~crosstalk_current"}]}, values=values, bench=bench)
+    undone, what = corrected(found, {"a.nc": faulty})
+    assert what == ["pickup of the voltages by the currents"]
+    np.testing.assert_allclose(undone["a.nc"].phase_current, plain.phase_current, atol=1e-12)
 
 
 def test_counts_that_the_angle_has_lost_are_added():

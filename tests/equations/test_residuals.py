@@ -163,6 +163,21 @@ def test_white_with_a_back_emf_that_has_harmonics(command):
         assert 0.75 < after[equation] < 1.2 and before[equation] > 1.3, equation
 
 
+def test_white_with_currents_that_pick_up_voltages():
+    entries = (
+        {"place": "current", "form": "pickup", "gain": 3e-3},
+        {"place": "current_b", "form": "pickup", "gain": 2e-3},
+    )
+    recording = recorded("reversal", unlisted=entries)
+    machine = machine_of({"a.nc": recording})
+    values = truth(machine, recording)
+    of = {"pickup.current": 3e-3, "pickup.current_b": 2e-3}
+    none, alike, both = (mean_squares(machine, values | {n: of[n] for n in list(of)[:k]}) for k in range(3))
+    for name in ("sensor_current", "torque"):  # the sum shows what one has of its own
+        assert both[name] < 1.2 < 1.5 < alike[name] < none[name], name
+    assert 5.0 * alike["torque"] < none["torque"]
+
+
 def test_white_with_a_winding_that_differs():
     entry = {"place": "winding", "form": "coefficient", "back_emf_b": 0.03, "inductance_b": -0.3}
     recording = recorded("reversal", unlisted=(entry,), fault=FAULT, health="seeded")

@@ -1,8 +1,8 @@
 """The measuring chain's part of what no catalogue lists: forms that change what is recorded and nothing else.
 
-Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, lag or
-filter, a clock of its own, and drift; the sensors' noise; then spikes, held samples, a channel slower than the
-recording, clipping and the converter's steps.
+Order: what a shape adds to a channel, the channel's curve, the drop of an inverter's switches, crosstalk, what a
+current's channel picks up of its phase's voltage, lag, filter or average, a clock of its own, and drift; the sensors'
+noise; then spikes, held samples, a channel slower than the recording, clipping and the converter's steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ RECORDED |= {of: tuple(n for c in channels for n in RECORDED[c]) for of, channel
 LATE = ("lag", "smoothing", "low_pass", "averaging")
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
 #: of the forms, shapes first
-ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", *LATE, "clock", "drift", *AFTER_NOISE)
+ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", "pickup", *LATE, "clock", "drift", *AFTER_NOISE)
 PARTS = 8  # of an interval, over which the shape of the back-EMF is averaged
 
 
@@ -68,6 +68,10 @@ class Chain:
                 source = f"{entry['place'].partition('_')[0]}_{entry['source']}"
                 for x, y in zip(_channels(signals, entry["place"]), _channels(true, source), strict=True):
                     x += entry["gain"] * y
+            elif entry["form"] == "pickup":
+                voltage = entry["place"].replace("current", "voltage")
+                for x in _channels(signals, entry["place"]):
+                    x += entry["gain"] * _channels(true, voltage)[0]
             elif entry["form"] == "drop":
                 current = entry["place"].replace("voltage", "current")
                 (x,), (i, *_) = _channels(signals, entry["place"]), _channels(true, current)

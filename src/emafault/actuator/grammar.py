@@ -76,7 +76,7 @@ OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
     "averaging": ("samples",),
     "sensor_curve": ("bend", "halves", "dead"), "gain": ("gain", "growth"), "drop": ("drop", "turn"),
-    "crosstalk": ("source", "gain"),
+    "crosstalk": ("source", "gain"), "pickup": ("gain",),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),
     "clock": ("scatter", "late", "rate"),
 }  # fmt: skip
@@ -116,7 +116,8 @@ def forms_at(place: str) -> list[str]:
     phased = quantity in ("voltage", "current")
     only = {
         "crosstalk": phased and phase in PHASES, "sensor_curve": phased, "gain": phased or quantity == "output",
-        "drop": quantity == "voltage", "drift": phase in PHASES or quantity in ("speed", "angle", "output", "bus"),
+        "drop": quantity == "voltage", "pickup": quantity == "current",
+        "drift": phase in PHASES or quantity in ("speed", "angle", "output", "bus"),
         "clock": quantity in ("angle", "output", "speed"),
     }  # fmt: skip
     return [*shapes, *(form for form in OF_CHANNELS if only.get(form, True))]

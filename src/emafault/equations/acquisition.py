@@ -231,6 +231,17 @@ def lost_by(kind: str, x: np.ndarray, full: float, turn: float) -> np.ndarray:
     return -np.abs(x) if kind == "halves" else direction(x, turn)
 
 
+def picked_up(p: Point, phase: str, voltage: np.ndarray | float) -> Dual:
+    """What a current's channel picks up (A) of its phase's voltage (V), as an amplifier does that rejects little of
+    what both its inputs have in common: all phases alike, or one its own."""
+    out = Dual(0.0)
+    for of in ("current", f"current_{phase}"):
+        share = p(f"pickup.{of}")
+        if share.slopes or share.value:
+            out = out + share * voltage
+    return out
+
+
 def dropped(p: Point, phase: str, current: np.ndarray) -> Dual:
     """What a voltage (V) of duty cycles has too much: it knows nothing of the drop of the switches and of their dead
     time, which goes with the current's direction.
@@ -299,8 +310,8 @@ class Currents(NamedTuple):
 
 
 def currents(rec: Signals, p: Point, rounding: Dual | None) -> Currents:
-    """The currents from the recorded ones: less lag, curve, crosstalk and drift of the recorder, then less offset and
-    gain of the sensors; ``rounding``: what the size of the means has too much (A), (sample,)."""
+    """The currents from the recorded ones: less lag, curve, crosstalk, pickup and drift of the recorder, then less
+    offset and gain of the sensors; ``rounding``: what the size of the means has too much (A), (sample,)."""
     means: list[Dual] = []
     ends: list[Dual] = []
     shown: list[Dual] = []
@@ -314,7 +325,7 @@ def currents(rec: Signals, p: Point, rounding: Dual | None) -> Currents:
         for j in range(3):
             on_time = undone(p, "current", source[:, j], rate[j][n], "abc"[j])
             i = on_time + bent(p, "current", "abc"[j], source[:, j], rec.actuator)
-            i = i - drifted(p, "current", "abc"[j], rec)
+            i = i - drifted(p, "current", "abc"[j], rec) - picked_up(p, "abc"[j], rec.voltage[:, j])
             if out is means and rounding is not None:
                 i = i - rounding * np.sign(rec.rows_from.current[:, j])
             for q in range(3):

@@ -112,7 +112,10 @@ def of_chain(unit: str, linear: Mapping[str, tuple[float, float]], lengths: Mapp
         clock: Entry = {"place": channel, "form": kind} | ({"rate": rates[0]} if rates else {})
         return _rounded(clock | ({**_means(starts), EACH: starts} if starts else {}))
     if kind == "crosstalk":
-        ((pair, gain),) = values.items()
+        ((name, (gain, _)),) = linear.items()
+        if name.startswith("pickup."):
+            return _rounded({"place": name.partition(".")[2], "form": "pickup", "gain": gain})
+        pair = name.rpartition(".")[2]
         return _rounded({"place": f"{channel}_{pair[0]}", "form": "crosstalk", "source": pair[1], "gain": gain})
     if kind == "curve":
         ((full, amount),) = ((n, v) for n, (v, _) in linear.items() if n != "dead.turn")

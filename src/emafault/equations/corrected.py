@@ -14,7 +14,19 @@ from ..io.recording import Recording, write_recording
 from ..io.sensors import without_spikes
 from ..resampled import before
 from ..switches import direction
-from .acquisition import CLOCKS, CURVES, GAIN_NAMES, RATE, clock_names, drifting, full_range, lost_by, rates, undone
+from .acquisition import (
+    CLOCKS,
+    CURVES,
+    GAIN_NAMES,
+    RATE,
+    clock_names,
+    drifting,
+    full_range,
+    lost_by,
+    picked_up,
+    rates,
+    undone,
+)
 from .coordinates import COEFFICIENTS
 from .diagnose import Diagnosed
 from .point import Point
@@ -84,7 +96,11 @@ def _steps(found: Diagnosed, name: str, size: int, interval: float) -> Iterator[
     for quantity in ("current", "voltage"):
         if f"~crosstalk_{quantity}" in told:
             gains = np.array([[values.get(f"crosstalk_{quantity}.{j}{q}", 0.0) for q in "abc"] for j in "abc"])
-            yield f"crosstalk between the {quantity}s", partial(_without_crosstalk, quantity=quantity, gains=gains)
+            if gains.any():
+                yield f"crosstalk between the {quantity}s", partial(_without_crosstalk, quantity=quantity, gains=gains)
+            shares = np.array([float(picked_up(Point(values, name, ()), j, 1.0).value) for j in "abc"])
+            if quantity == "current" and shares.any():
+                yield "pickup of the voltages by the currents", partial(_without_pickup, shares=shares)
     share = (np.arange(size) + 0.5) / size
     if "~ambient" in told:
         yield "ambient temperature", partial(_warmer, by=values.get(f"ambient.start@{name}", 0.0))
@@ -224,6 +240,11 @@ def _without_crosstalk(recording: Recording, quantity: str, gains: np.ndarray) -
     if quantity == "voltage":
         return replace(recording, phase_voltage=recording.phase_voltage - recording.phase_voltage @ gains.T)
     return _currents(recording, lambda x: x - x @ gains.T)
+
+
+def _without_pickup(recording: Recording, shares: np.ndarray) -> Recording:
+    """``shares`` (phase,) of its voltage that each current's channel picks up (A/V)."""
+    return _currents(recording, lambda x: x - shares * recording.phase_voltage)
 
 
 def _currents(recording: Recording, of: Callable[[np.ndarray], np.ndarray]) -> Recording:

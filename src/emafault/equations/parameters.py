@@ -26,6 +26,7 @@ TIMING = 0.5  # of a control period, by which samples and means within it may be
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 #: ways of coming late that someone has chosen, with what is the least; an average is over two samples at least
 MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "averaged": 0.5}
+TALK = 0.03  # of its range, that a channel may take up of another's
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DEAD = 0.005  # of the current limit, that a current sensor may be dead within
 DROP = 0.02  # of the supply, that voltages may lack of the switches' drop
@@ -193,7 +194,13 @@ def measuring_chain(
     pairs = [(j, q) for j in PER_PHASE for q in PER_PHASE if j != q]
     # one pair: what both others add to a phase together is a gain, for the three add up to nothing
     for quantity in ("current", "voltage"):
-        variants = [Variant([Parameter(f"crosstalk_{quantity}.{j}{q}", 0.0, 0.0, 0.03, "1")]) for j, q in pairs]
+        variants = [Variant([Parameter(f"crosstalk_{quantity}.{j}{q}", 0.0, 0.0, TALK, "1")]) for j, q in pairs]
+        if quantity == "current":
+            sd = TALK * a.current_limit / a.bus_voltage
+            variants += [
+                Variant([Parameter(f"pickup.{c}", 0.0, 0.0, sd, "A/V")])
+                for c in ("current", *(f"current_{j}" for j in PER_PHASE))
+            ]
         out.append(Unit(f"~crosstalk_{quantity}", "form", _shows(quantity), variants, among=2.0))
     at = TURN * a.current_limit
     turns = {k: [Parameter(f"{k}.turn", at, at, at, "A", vanishes=0.0)] for k in ("drop", "dead")}

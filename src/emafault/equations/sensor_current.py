@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from .acquisition import OF_ONE_PHASE, bent, drifted, gain_of_its_own, recorded_late
+from .acquisition import OF_ONE_PHASE, bent, drifted, gain_of_its_own, picked_up, recorded_late
 from .dual import Dual, value_of
 from .point import State, effect_name
 from .terms import with_hook
 
 
 def residual(state: State) -> Dual:
-    """Recorded sum (A) less what gains, offsets, drift, crosstalk, curves and lag make of currents that add up to
-    nothing.
+    """Recorded sum (A) less what gains, offsets, drift, crosstalk, pickup, curves and lag make of currents that add up
+    to nothing.
 
     The true currents are taken as the recorded ones less their mean: the noise of these is independent of that of the
     sum, so that no term can explain the noise. The recorded sum keeps coefficient one.
@@ -24,7 +24,7 @@ def residual(state: State) -> Dual:
         for m in reversed(with_hook("current")):
             seen = _recorded(m, p.of(effect_name(m)), j, seen)
         seen = _late(state, seen, phase)
-        seen = seen + drifted(p, "current", phase, rec)
+        seen = seen + drifted(p, "current", phase, rec) + picked_up(p, phase, rec.voltage[:, j])
         for q, other in enumerate("abc"):
             if q != j:
                 seen = seen + p(f"crosstalk_current.{phase}{other}") * true[q]

@@ -179,6 +179,10 @@ def _load(fault: Fault) -> Told:
 
 def _crosstalk(fault: Fault) -> Told:
     ((name, gain),) = fault.values.items()
+    if name.startswith("pickup."):
+        which = name.partition("_")[2]
+        whose = f"channel of phase {which} picks" if which else "channels pick"
+        return Told(f"the current {whose} up {1e3 * gain:.2g} mA per volt of the phase's voltage", "crosstalk")
     phases, what = name.rpartition(".")[2], fault.channel
     takes_up = f"takes up {100.0 * gain:.2g} % of the {what} of phase {phases[1]}"
     return Told(f"the {what} channel of phase {phases[0]} {takes_up}", "crosstalk")

@@ -130,6 +130,7 @@ def _of_group(group: str, short: str) -> str:
             f"crosstalk_{quantity}": f"{quantity} of phase {phase} in the channel of phase {short[0]}"
             for quantity in ("current", "voltage")
         },
+        "pickup": f"{channel} channel{f' of phase {side}' if side else 's'}: pickup of the phase's voltage",
         "curve": f"{channel} channel{f' of phase {side}' if side else 's'}: cubic nonlinearity at full range",
         "halves": f"{channel} channel{f' of phase {side}' if side else 's'}: half the difference of its gains",
         "dead": "dead band of the current, turned about"
@@ -153,7 +154,7 @@ def _of_group(group: str, short: str) -> str:
 
 
 def _late(way: str) -> str:
-    return LATE.get(way, way).removesuffix(" {}")
+    return "is averaged and late by" if way == "averaged" else LATE.get(way, way).partition(" {")[0]
 
 
 def of_form(form: Described, what: str, name: str) -> str:
