@@ -418,12 +418,14 @@ CHANNELS = {
     "half-waves of a current unlike": changed(
         "sensor_curve in sensor_current", phase_current=half_waves, phase_current_end=half_waves
     ),
-    "voltages in the currents": Channel(change=with_voltages_in_currents),
+    "voltages in the currents": Channel(
+        itself=("crosstalk in sensor_current",), change=with_voltages_in_currents,
+    ),
     "currents averaged over three samples": changed(
         "lag in sensor_current",
         phase_current=lambda i, n: averaged(i, 3), phase_current_end=lambda i, n: averaged(i, 3),
     ),
-    "speed averaged over nine samples": changed(rotor_speed=lambda w, n: averaged(w, 9)),
+    "speed averaged over nine samples": changed("lag in sensor_speed", rotor_speed=lambda w, n: averaged(w, 9)),
     "three faults at once": changed(
         "drift in sensor_current", "lag in sensor_voltage", "lag in sensor_output",
         phase_current=plus_on_b(0.02), phase_current_end=plus_on_b(0.02), phase_voltage=late(0.4),
