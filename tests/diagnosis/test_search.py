@@ -89,4 +89,6 @@ def test_a_look_at_some_sets_fits_these_alone_and_a_search_from_there_goes_on():
     search = Search(reduced, units, candidates)
     search.look([(Choice("one", 0, 1.0), Choice("three", 0, 1.0), Choice("gone", 0, 1.0))])
     assert {m.units for m in search.ranked()} == {(), ("one", "three")}
+    search.look_without()
+    assert {m.units for m in search.ranked()} == {(), ("one",), ("three",), ("one", "three")}
     assert search.run()[0].units == ("one", "three", "two")

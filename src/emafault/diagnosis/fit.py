@@ -224,8 +224,9 @@ class Bench(Describing):
         """Sets by the linear model; of a unit that may have no fault, under the prior that it has none where that is
         sure enough to be named.
 
-        From the second time on, what leads under the prior of the last search is only looked at under the other, by
-        which is searched as well where that look is in its favour.
+        From the second time on, what leads under the prior of the last search is only looked at under the other, and so
+        is the likeliest set less each of its members, which may have stood in for a fault; where that look is in its
+        favour, the other is searched by as well.
         """
         before = self.sound
         found = {before: self._searched(normal, remainders)}
@@ -250,6 +251,7 @@ class Bench(Describing):
         search = self.searching(reduced, units, candidates, closer, self.scanned)
         if only is not None:
             search.look(only)
+            search.look_without()
             return search
         search.run(self.leading.get(self.sound, ()))
         self.leading[self.sound] = search.leading()

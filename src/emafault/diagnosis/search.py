@@ -232,6 +232,12 @@ class Search:
             if self._may_be(kept):
                 self.fit(kept)
 
+    def look_without(self) -> None:
+        """Fit the likeliest set less each of its members."""
+        best = self.ranked()[0]
+        for unit in best.units:
+            self.less(best, unit)
+
     def leading(self) -> list[tuple[Choice, ...]]:
         """The likeliest sets, and the likeliest of those without a remainder: where a search may go on from."""
         ranked = self.ranked()
