@@ -14,8 +14,8 @@ from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Unit
 from emafault.diagnosis.sets import Choice, Model
 from emafault.equations import held_out
-from emafault.equations.held_out import _less
 from emafault.equations.how_far import CONTROLLER_SETTINGS
+from emafault.equations.predicted import less
 
 from .conftest import machine_of, recorded
 
@@ -93,10 +93,10 @@ def test_what_is_let_go_leaves_a_remainder_where_that_explains_most():
     units = {"voltage_gain": Unit("voltage_gain", "structural", ("electrical",), [])}
     search = SimpleNamespace(fit=fit, units=units, candidates=[(u, 0) for u in explains])
     model = fit((("voltage_gain", 0), ("cogging", 0)))
-    assert set(_less(search, model, "voltage_gain", True).units) == {
+    assert set(less(search, model, "voltage_gain", True).units) == {
         "cogging", "remainder:electrical_b",
     }  # fmt: skip
-    assert _less(search, model, "voltage_gain", False).units == ("cogging",)
+    assert less(search, model, "voltage_gain", False).units == ("cogging",)
 
 
 def searching(units):

@@ -20,9 +20,10 @@ from ..effects.scaling import scaled
 from ..errors import InputError
 from ..io.enough import FEWEST, spread
 from ..io.recording import Recording
-from .held_out import Explored, held_to_account, misfits
+from .held_out import held_to_account, misfits
 from .machine import ReferenceActuator
 from .next_recording import LIKELY, RIVALS, next_recordings
+from .predicted import Explored
 from .quality import seen, told
 from .signals import Signals, estimated_noise
 from .unconfirmed import unconfirmed

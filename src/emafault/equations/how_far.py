@@ -13,9 +13,10 @@ from ..diagnosis.point import is_parameter
 from ..diagnosis.sets import Choice, Model
 from ..io.recording import Recording
 from . import electrical
-from .held_out import Explored, HeldOut
+from .held_out import HeldOut
 from .parameters import FAULTS, OF_LAW
 from .point import SEEDED
+from .predicted import Explored
 from .telling import Z
 
 #: what the controller's owner may set is no part of a gap, and recordings set aside may tell what the others do not
