@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import Described, another_form_of, curve, with_forms
+from emafault.diagnosis.described import Described, with_forms
 from emafault.diagnosis.describing import FEWEST, MOST
 from emafault.diagnosis.fit import Bench
 from emafault.diagnosis.model import Block, Parameter, Unit, Variant
 from emafault.diagnosis.search import Search
 from emafault.diagnosis.sets import Choice, Model
+from emafault.diagnosis.shown import another_form_of, curve
 from emafault.diagnosis.whitening import Weights
 
 ROWS = 2000

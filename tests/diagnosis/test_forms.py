@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import ALSO, Described, WithForms, proposed, refined, scanned
+from emafault.diagnosis.described import ALSO, Described, WithForms
 from emafault.diagnosis.describing import Describing
 from emafault.diagnosis.forms import FORMS, function
 from emafault.diagnosis.forms.memory import columns
 from emafault.diagnosis.left import Left, gain
 from emafault.diagnosis.model import Block
+from emafault.diagnosis.scanning import proposed, refined, scanned
 from emafault.diagnosis.wandering import log_odds
 from emafault.diagnosis.whitening import WANDERING, Weights, coloured, filtered
 

@@ -12,7 +12,7 @@ from emafault.diagnosis.model import Parameter, Unit, Variant
 from emafault.diagnosis.naming import possible_place, read
 from emafault.diagnosis.search import Search
 from emafault.diagnosis.sets import Candidate, Choice, Model
-from emafault.equations import held_out
+from emafault.equations import held_out, predicted
 
 
 def unit(name, *equations, kind="structural"):
@@ -149,7 +149,7 @@ def held(
         candidates={("remainder:torque", 0): None}, units=units,
     )  # fmt: skip
     monkeypatch.setattr(held_out, "overdispersion", lambda every, whole, leading, unit: dispersion)
-    monkeypatch.setattr(held_out, "_misfit", lambda explored, m, out="": misfit[tuple(u for u in m.units if u != out)])
+    monkeypatch.setattr(predicted, "_misfit", lambda explored, m, out="": misfit[tuple(u for u in m.units if u != out)])
     monkeypatch.setattr(held_out, "log_odds_of_change", lambda bench, fit, m, effect: change)
     monkeypatch.setattr(held_out, "log_odds_of_another_cause", lambda fit, m, effect, lacking: another)
     explored = held_out.Explored(None, SimpleNamespace(models=explored, search=search), None)
@@ -289,7 +289,7 @@ def test_remainders_are_integrated_over_what_the_explored_recordings_leave_open(
     bench = SimpleNamespace(inserted=lambda m, normal: SimpleNamespace(values={}))
     left = Model((Choice("remainder:torque", 0, width),))
     explored = held_out.Explored(bench, SimpleNamespace(search=search, normal=None), ladder)
-    found = held_out._misfit(explored, left)
+    found = predicted._misfit(explored, left)
     posterior = np.zeros((3, 3))
     posterior[:2, :2] = np.linalg.inv(M + np.eye(2) / width**2)
     posterior[2, 2] = width**2

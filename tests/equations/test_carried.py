@@ -10,8 +10,9 @@ from emafault.actuator.parameters import make_runs
 from emafault.actuator.simulate import time_axis
 from emafault.actuator.unlisted import followed, row_of
 from emafault.dataset import simulate_and_measure
-from emafault.diagnosis.described import Described, WithForms, proposed, refined
+from emafault.diagnosis.described import Described, WithForms
 from emafault.diagnosis.forms import FORMS
+from emafault.diagnosis.scanning import proposed, refined
 from emafault.diagnosis.whitening import Weights
 from emafault.equations.carried import DRIVERS, of_chain, of_form
 from emafault.equations.handover import experiment_text

@@ -13,7 +13,7 @@ from emafault.diagnosis.described import Described
 from emafault.diagnosis.fit import NOTHING, Bench
 from emafault.diagnosis.model import Unit
 from emafault.diagnosis.sets import Choice, Model
-from emafault.equations import held_out
+from emafault.equations import held_out, predicted
 from emafault.equations.how_far import CONTROLLER_SETTINGS
 from emafault.equations.predicted import less
 
@@ -170,7 +170,7 @@ def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     """Two causes that explain the same: once one is not told, the other is compared with nothing in its place."""
     alike = {"unit_calibration", "~ambient"}
     monkeypatch.setattr(
-        held_out, "_misfit", lambda _, model, out="": 0.0 if (alike & set(model.units)) - {out} else 400.0
+        predicted, "_misfit", lambda _, model, out="": 0.0 if (alike & set(model.units)) - {out} else 400.0
     )
     kinds = {"unit_calibration": "calibration", "~ambient": "form", "remainder:electrical_a": "remainder"}
     units = {u: Unit(u, kind, ("electrical",), []) for u, kind in kinds.items()}
@@ -184,7 +184,7 @@ def test_what_is_let_go_stands_in_for_no_other(monkeypatch):
     search = SimpleNamespace(fit=fit, less=less, units=units, candidates=[(u, 0) for u in units])
     alone, both = fit((("~ambient", 0),)), fit((("unit_calibration", 0), ("~ambient", 0)))
     explored = SimpleNamespace(fit=SimpleNamespace(models=[alone, both], search=search))
-    account = held_out._Account(explored, ["unit_calibration"])
+    account = predicted.Account(explored, ["unit_calibration"])
     assert account.ratio("~ambient") == account.ratio("unit_calibration") == 0.0
     account.let_go("~ambient", left=True)
     assert account.ratio("unit_calibration") == 200.0
@@ -213,7 +213,7 @@ def test_a_form_is_confirmed_by_what_it_adds_itself(monkeypatch, shows, ratio):
         there = "~bump" in model.units
         return 100.0 + (0.0 if there else 80.0) + (90.0 if there and out and shows else 0.0)
 
-    monkeypatch.setattr(held_out, "_misfit", misfit)
+    monkeypatch.setattr(predicted, "_misfit", misfit)
 
     def fit(members):
         return Model(tuple(Choice(u, v, 1.0) for u, v in members), float(len(members)), 0.0, {}, {})
@@ -223,7 +223,7 @@ def test_a_form_is_confirmed_by_what_it_adds_itself(monkeypatch, shows, ratio):
 
     search = SimpleNamespace(fit=fit, less=less, units=units, candidates=[(u, 0) for u in units])
     explored = SimpleNamespace(fit=SimpleNamespace(models=[fit((("~bump", 0), ("~lag", 0)))], search=search))
-    account = held_out._Account(explored, [])
+    account = predicted.Account(explored, [])
     assert account.ratio("~bump") == ratio
 
 
@@ -232,7 +232,7 @@ def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
     units = {u: Unit(u, "form", ("torque",), []) for u in ("~frequency", "~function")}
     misfits = {(): 400.0, ("~frequency",): 700.0, ("~function",): 900.0, ("~frequency", "~function"): 100.0}
     monkeypatch.setattr(
-        held_out, "_misfit", lambda _, model, out="": misfits[tuple(u for u in model.units if u != out)]
+        predicted, "_misfit", lambda _, model, out="": misfits[tuple(u for u in model.units if u != out)]
     )
 
     def fit(members):
@@ -245,7 +245,7 @@ def test_nothing_is_compared_beside_what_all_recordings_dismiss(monkeypatch):
     both, one = fit((("~frequency", 0), ("~function", 0))), fit((("~function", 0),))
     explored = SimpleNamespace(fit=SimpleNamespace(models=[both], search=search))
     for models, ratio in (([both], 300.0), ([one], -250.0)):
-        account = held_out._Account(explored, [])
+        account = predicted.Account(explored, [])
         account.let_go_absent(models)
         assert account.ratio("~function") == ratio
     account.let_go_absent([one])
@@ -283,7 +283,7 @@ def test_what_is_told_has_to_predict_not_what_the_search_had():
     units = ("compliance", "inertia", "stribeck")
     search = searching({u: Unit(u, "structural", ("torque",), []) for u in units})
     explored = SimpleNamespace(fit=SimpleNamespace(models=[search.fit([(u, 0) for u in units[:2]])], search=search))
-    account = held_out._Account(explored, [])
+    account = predicted.Account(explored, [])
     assert account.counterpart(search.fit([("compliance", 1)])).choices == (Choice("compliance", 0, 1.0),)
     assert account.counterpart(search.fit([("stribeck", 0)])).units == ("stribeck",)
     assert account.counterpart(search.fit([("~seen_by_all_alone", 0)])).units == ()

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emafault.diagnosis.described import Described, proposed, with_forms
+from emafault.diagnosis.described import Described, with_forms
+from emafault.diagnosis.scanning import proposed
 from emafault.equations import telling
 from emafault.equations.telling_chain import told_of_chain
 

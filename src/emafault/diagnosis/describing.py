@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .described import Described, proposed, refined, with_forms
+from .described import Described, with_forms
 from .forms import function
 from .model import LISTED
+from .scanning import proposed, refined
 from .search import NEAR, Search
 from .sets import Model
 from .settling import Settling

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .described import Described, Proposal, scanned, with_forms
+from .described import Described, with_forms
 from .left import Left
 from .linear import (
     FEW,
@@ -20,6 +20,7 @@ from .linear import (
     weights_from,
 )
 from .model import SETTINGS, Block
+from .scanning import Proposal, scanned
 from .whitening import Weights
 
 KEPT = 2e8  # bytes of columns that a process keeps from a pass to the one that renews the weights

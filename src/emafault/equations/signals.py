@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 from ..actuator.motor import AXIS
 from ..actuator.parameters import ActuatorParameters
 from ..actuator.sensors import CHANNEL, SensorNoise
-from ..diagnosis.described import PRIOR
+from ..diagnosis.scanning import PRIOR
 from ..io.currents_noise import adds_up, derived_phase, resting_noise, shares_of_noise
 from ..io.lattice import lattice_step, spacing
 from ..io.motion import calm_motion

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnosis.described import another_form_of, curve
 from ..diagnosis.evidence import Definite, Normal, Reduced
 from ..diagnosis.fit import Bench, Fit
 from ..diagnosis.naming import POSSIBLE, Reading, possible_place, told_sets
 from ..diagnosis.point import is_parameter
 from ..diagnosis.search import Search
 from ..diagnosis.sets import Model
+from ..diagnosis.shown import another_form_of, curve
 from ..diagnosis.where import where
 from ..effects import EFFECTS
 from ..faults import FAULT_NAMES
