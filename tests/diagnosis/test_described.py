@@ -120,9 +120,10 @@ def test_what_is_in_one_channel_may_be_in_another(leads, kept):
     assert [f.id for f in bench.described] == [f"~f_{j}" for j in kept]
 
 
-@pytest.mark.parametrize("left", [True, False])
-def test_several_forms_are_one_remainder_unless_they_leave_none(monkeypatch, left):
-    """Scans go on while the leading set is full of what they propose; what ends at a remainder is taken back."""
+@pytest.mark.parametrize(("left", "far"), [(True, False), (False, False), (False, True)])
+def test_several_forms_are_one_remainder_unless_they_leave_none(monkeypatch, left, far):
+    """Scans go on while the leading set is full of what they propose; what ends at a remainder is taken back, and so is
+    what is far from describing all."""
     bench = Bench(Wave((0.0, 0.0)), Wave.recordings)
     form = Described("~f", "frequency", "torque", 0, (("frequency", 21.3, 0.01, "Hz"),), 1.0, 1.0)
 
@@ -139,10 +140,32 @@ def test_several_forms_are_one_remainder_unless_they_leave_none(monkeypatch, lef
     monkeypatch.setattr(bench, "_until_still", lambda *_: ended)
     monkeypatch.setattr(bench, "_none_to_leave", lambda *_: ended)
     monkeypatch.setattr(bench, "_lacking", lambda _: left)
+    monkeypatch.setattr(bench, "_out_of_reach", lambda *_: far)
     found = bench._with_all_described(*"wns")
-    more = 0 if left else MOST - FEWEST
-    assert found == (tuple("wns") if left else ended)
+    more = 0 if left or far else MOST - FEWEST
+    assert found == (ended if more else tuple("wns"))
     assert (bench.scanned, len(bench.described), bench.point["load.T"]) == (FEWEST + more, more, more)
+
+
+@pytest.mark.parametrize(("adds", "far"), [(19.0, False), (21.0, True)])
+def test_forms_are_out_of_reach_of_a_remainder_that_adds_more_than_they_may(monkeypatch, adds, far):
+    """Of two forms the least explains ten nats, and sets may have two more."""
+    bench = Bench(Wave((0.0, 0.0)), Wave.recordings)
+    form = Described("~f", "frequency", "torque", 0, (("frequency", 21.3, 0.01, "Hz"),), 1.0, 1.0)
+    bench.describe([form, replace(form, id="~g")])
+    bench.scanned = MOST - 2
+    worth = {"~f": 30.0, "~g": 10.0, "remainder:torque": adds, "remainder:bus": 500.0}
+
+    def fit(members):
+        return Model(tuple(Choice(u, v, 1.0) for u, v in members), sum(worth[u] for u, _ in members))
+
+    search = SimpleNamespace(
+        ranked=lambda: [fit((("~f", 0), ("~g", 0)))], fit=fit,
+        less=lambda model, unit: fit(tuple((c.unit, 0) for c in model.choices if c.unit != unit)),
+        candidates=[("~f", 0), ("remainder:torque", 0), ("remainder:bus", 0)],
+    )  # fmt: skip
+    monkeypatch.setattr(bench, "_searched", lambda *_: search)
+    assert bench._out_of_reach(search, None) is far
 
 
 @pytest.mark.parametrize(("size", "bins"), [(0.5, 30), (0.055, 15), (0.02, 8)])

@@ -101,8 +101,8 @@ class Bench(Describing):
         self, whites: list[White], normal: Normal, search: Search
     ) -> tuple[list[White], Normal, Search]:
         """Scan on while the leading set has as many forms of scans as sets may have, which are one more each time; if
-        that ends at a set with a remainder where they act, where it began: what several forms do not describe is a
-        remainder beside few.
+        that ends at a set with a remainder where they act, or can be seen to, where it began: what several forms do not
+        describe is a remainder beside few.
         """
         fit, begun = (whites, normal, search), self._state()
         while self.scanned < MOST and self._count_scanned(search) == self.scanned:
@@ -113,6 +113,9 @@ class Bench(Describing):
                 break
             self.scanned += 1
             whites, normal, search = self._until_still(*self._renewed(), FIRST, False)
+            if self._count_scanned(search) == self.scanned and self._out_of_reach(search, normal):
+                self._restore(begun)
+                return fit
         if self.scanned == FEWEST:
             return fit
         whites, normal, search = self._until_still(*self._renewed(), ROUNDS)
@@ -122,6 +125,22 @@ class Bench(Describing):
             return whites, normal, search
         self._restore(begun)
         return fit
+
+    def _out_of_reach(self, search: Search, normal: Normal) -> bool:
+        """Whether a remainder where the leading set's forms of scans act would still add more to that than all the
+        forms which it may yet have, were each as good as the least of those."""
+        best = search.ranked()[0]
+        mine = [f for f in self.described if f.id in best.units]
+        least = min(best.log_posterior - search.less(best, f.id).log_posterior for f in mine)
+        with_remainders = self._searched(normal, True, [best.choices])
+        members = tuple((c.unit, c.variant) for c in best.choices)
+        places = {f"remainder:{q}" for f in mine for q in (f.equation, f.seen)}
+        added = [
+            with_remainders.fit((*members, m)).log_posterior - with_remainders.fit(members).log_posterior
+            for m in with_remainders.candidates
+            if m[0] in places
+        ]
+        return max(added, default=0.0) > (MOST - self.scanned) * least
 
     def _with_none_to_leave(self, whites: list[White], normal: Normal) -> tuple[list[White], Normal, Search]:
         return self._none_to_leave(*self._until_still(whites, normal, ROUNDS))
