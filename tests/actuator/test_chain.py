@@ -134,8 +134,8 @@ def test_samples(true):
     spikes = changed(true, place="current_b", form="spikes", share=0.02, level=2.0)["phase_current"]
     assert (spikes != 0.0).sum() == 20 and 1.0 < np.std(spikes[spikes != 0.0]) < 3.0
     assert set(OF_CHANNELS) == {
-        "crosstalk", "pickup", "lag", "smoothing", "low_pass", "averaging", "sensor_curve", "gain", "drop", "drift",
-        "clipping", "adc_step", "held", "hold", "spikes", "clock",
+        "crosstalk", "pickup", "lag", "smoothing", "low_pass", "butterworth", "averaging", "sensor_curve", "gain",
+        "drop", "drift", "clipping", "adc_step", "held", "hold", "spikes", "clock",
     }  # fmt: skip
 
 

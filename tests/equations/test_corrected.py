@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from emafault.delays import averaged, filtered
 from emafault.equations.corrected import corrected
-from emafault.first_order import averaged, filtered
 
 from .conftest import ACTUATOR, recorded
 

@@ -8,10 +8,10 @@ import pytest
 
 from emafault.actuator.chain import Chain
 from emafault.actuator.parameters import RUN_DTYPE
+from emafault.delays import smoothed
 from emafault.equations.corrected import _straightened, corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
-from emafault.first_order import smoothed
 from emafault.io.recording import read_recording
 
 from .conftest import ACTUATOR, COGGING, NOISE, bench, machine_of, recorded, verdict_of

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..first_order import averaged, filtered, smoothed
+from ..delays import averaged, filtered, filtered_twice, smoothed
 from ..resampled import before
 from ..switches import direction
 from .grammar import CONTROLLER, FACTORS, IN_RUN, LOGGERS, MACHINE, PHASES, SHAPES, of_recording
@@ -26,7 +26,8 @@ RECORDED = {
 RECORDED |= {of: tuple(n for c in channels for n in RECORDED[c]) for of, channels in LOGGERS.items()}
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter, by an
 #: average over samples
-LATE = ("lag", "smoothing", "low_pass", "averaging")
+LATE = ("lag", "smoothing", "low_pass", "butterworth", "averaging")
+THROUGH = {"smoothing": smoothed, "low_pass": filtered, "butterworth": filtered_twice}  # by their delay
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
 #: of the forms, shapes first
 ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", "pickup", *LATE, "clock", "drift", *AFTER_NOISE)
@@ -163,9 +164,8 @@ class Chain:
             lag = entry["lag"]
             other = np.concatenate([x[:1], x[:-1]]) if lag > 0.0 else np.concatenate([x[1:], x[-1:]])
             x += abs(lag) * (other - x)
-        elif form in ("smoothing", "low_pass"):
-            through = smoothed if form == "smoothing" else filtered
-            x[...] = np.apply_along_axis(through, 0, x, entry["delay"])
+        elif form in THROUGH:
+            x[...] = np.apply_along_axis(THROUGH[form], 0, x, entry["delay"])
         elif form == "averaging":
             x[...] = np.apply_along_axis(averaged, 0, x, 0.5 * (entry["samples"] - 1.0))
         elif form == "gain":

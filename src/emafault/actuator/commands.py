@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..delays import filtered
 from ..errors import InputError, one_line, shown
-from ..first_order import filtered
 from ..places import file_at
 from .grammar import CONTROLLER
 

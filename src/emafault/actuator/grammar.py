@@ -74,7 +74,7 @@ SHAPES = {
 }  # fmt: skip
 OF_CHANNELS = {
     "drift": ("at_start", "at_end"), "lag": ("lag",), "smoothing": ("delay",), "low_pass": ("delay",),
-    "averaging": ("samples",),
+    "butterworth": ("delay",), "averaging": ("samples",),
     "sensor_curve": ("bend", "halves", "dead"), "gain": ("gain", "growth"), "drop": ("drop", "turn"),
     "crosstalk": ("source", "gain"), "pickup": ("gain",),
     "spikes": ("share", "level"), "held": ("share",), "hold": ("every",), "clipping": ("level",), "adc_step": ("step",),

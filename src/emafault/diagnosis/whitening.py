@@ -16,6 +16,7 @@ TILE = 1500  # rows that are whitened together
 GRID = 128  # frequencies at which it is looked at
 WANDERING = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)  # shares of an innovation that a slow level may follow by
 QUIETEST = 0.05  # of the mean variance, that most rows may have
+LEAST = 1e-6  # variance of what is left, over the noise as stated: what is less is rounding
 LOCAL = 150  # rows whose variance is estimated together
 
 
@@ -218,19 +219,19 @@ def coloured(white: np.ndarray, keep: np.ndarray, changing: bool = True, least: 
         # of what it leaves of these rows, not of the spectrum without dips: else a level that is none takes up what an
         # autoregression then lacks
         power = float(np.sum(filtered(white[:, None], trial)[keep, 0] ** 2))
-        score = n * np.log(power / n) + len(coefficients) * np.log(n) if power > 0.0 else np.inf
+        score = n * np.log(max(power / n, LEAST)) + len(coefficients) * np.log(n) if power > 0.0 else np.inf
         scores.append(score)
         score += (wander > 0.0) * np.log(n)
         if score < best:
             best = score
-            chosen = replace(trial, variance=np.full(len(white), max(variance, 1e-6)))
+            chosen = replace(trial, variance=np.full(len(white), max(variance, LEAST)))
     if not changing or not np.isfinite(scores).all():
         return chosen
     chosen = replace(chosen, wandering=tuple(0.5 * (scores[0] - np.array(scores))))
     new = filtered(white[:, None], chosen)[:, 0]
     local = local_variance(new, keep, LOCAL)
     variance = chosen.variance * float(np.mean(new[keep] ** 2 / local[keep])) * local
-    return replace(chosen, variance=np.maximum(variance, chosen.variance if least > 0.0 else 1e-6))
+    return replace(chosen, variance=np.maximum(variance, chosen.variance if least > 0.0 else LEAST))
 
 
 def local_variance(white: np.ndarray, keep: np.ndarray, width: int) -> np.ndarray:

@@ -3,7 +3,8 @@
 A channel that lags records (1 - lag) x[n] + lag x[n - 1] of a true signal x. One that smooths by a memory m, as a
 logger may, records y with y[n] + m (y[n] - y[n - 1]) = x[n]. One behind an analogue first-order filter of time constant
 T has y + T dy/dt = x, of which the mean over an interval is exact where the filtered signal at its ends is recorded.
-One that averages records means of samples, which lose what cannot be had back: such a signal is predicted, not undone.
+One behind a filter of the second order, or that averages samples, loses what cannot be had back: such a signal is
+predicted, not undone.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..actuator.grammar import LOGGERS
 from ..actuator.parameters import ActuatorParameters
-from ..first_order import LEAST, ahead, averaged, averaging, filtered, response, smoothed
+from ..delays import LEAST, ahead, averaged, averaging, filtered, filtered_twice, response, smoothed
 from ..switches import direction, turning
 from .dual import Dual
 from .point import Point, effect_name
@@ -24,6 +25,8 @@ from .terms import with_hook
 #: logger -> channels that it may have of its own, with a clock that is not that of the rest
 CLOCKS = {channel: (channel,) for channel in ("angle", "output", "speed")} | LOGGERS
 OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage or current may lag by itself
+#: way of coming late that is told by its delay -> what it makes of a signal
+OPERATES = {"smoothed": smoothed, "filtered": filtered, "twice": filtered_twice, "averaged": averaged}
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
 GAIN_NAMES = ("gain", "gain_drift")
@@ -49,12 +52,14 @@ def advanced(x: np.ndarray) -> np.ndarray:
 
 
 class Late(NamedTuple):
-    """Intervals by which a channel comes late and early, is smoothed, filtered and averaged."""
+    """Intervals by which a channel comes late and early, is smoothed, filtered, filtered by the second order and
+    averaged."""
 
     late: Dual
     early: Dual
     smooth: Dual
     constant: Dual
+    twice: Dual
     average: Dual
 
 
@@ -66,19 +71,19 @@ def _late(p: Point, channel: str, phase: str) -> Late:
         own = p(f"lag.{channel}_{phase}_{way}") if phase and way in OF_ONE_PHASE else Dual(0.0)
         return all_alike + own if own.slopes or own.value else all_alike
 
-    return Late(of("late"), of("early"), of("smoothed"), of("filtered"), of("averaged"))
+    return Late(of("late"), of("early"), *map(of, OPERATES))
 
 
 def recorded_late(p: Point, channel: str, x: Dual, size: int, phase: str = "") -> Dual:
     """What is recorded of a true signal on a channel that lags (in intervals, either sign), smooths, filters or
     averages."""
-    late, early, smooth, constant, average = _late(p, channel, phase)
+    late, early, *others = _late(p, channel, phase)
     out = x
     if late.slopes or late.value:
         out = out + late * _changed(x, delayed, late, size)
     if early.slopes or early.value:
         out = out + early * _changed(x, advanced, early, size)
-    for amount, operate in ((smooth, smoothed), (constant, filtered), (average, averaged)):
+    for amount, operate in zip(others, OPERATES.values(), strict=True):
         if amount.slopes or amount.value > LEAST:
             out = through(out, operate, amount, size)
     skew = p(f"skew.{channel}@{p.recording}")
@@ -120,9 +125,12 @@ def as_before(x: np.ndarray, late: Dual, channel: str) -> Dual:
 
 def response_of(p: Point, channel: str) -> np.ndarray:
     """(interval,) what a channel that lags, filters or averages records of one interval of one."""
-    late, early, _, constant, average = (float(x.value) for x in _late(p, channel, ""))
-    shifted = np.convolve(np.convolve([1.0 - late, late], [early, 1.0 - early]), averaging(average))
-    return np.convolve(shifted, response(constant)) if constant > LEAST else shifted
+    late, early, _, constant, twice, average = (float(x.value) for x in _late(p, channel, ""))
+    out = np.convolve(np.convolve([1.0 - late, late], [early, 1.0 - early]), averaging(average))
+    for through_it, delay in ((filtered, constant), (filtered_twice, twice)):
+        if delay > LEAST:
+            out = np.convolve(out, response(through_it, delay))
+    return out
 
 
 def through(x: Dual, operate: Callable[[np.ndarray, float], np.ndarray], amount: Dual, size: int) -> Dual:
@@ -151,11 +159,12 @@ def late_by(p: Point, channel: str) -> Dual:
 
 
 def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str = "") -> Dual:
-    """The true signal from one recorded on a channel that lags, smooths or filters; from one that averages, on time.
+    """The true signal from one recorded on a channel that lags, smooths or filters; from one that averages or
+    filters twice, on time.
 
     ``rate``: change of the recorded signal over an interval, of what is a mean over it from its start to its end.
     """
-    late, early, smooth, constant, average = _late(p, channel, phase)
+    late, early, smooth, *others = _late(p, channel, phase)
     out = Dual(x)
     if late.slopes or late.value > LEAST:
         out = out + _ahead(x, late)
@@ -163,7 +172,7 @@ def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str =
         out = out + _ahead(x[::-1], early).linear(lambda y: y[::-1], len(x))
     if smooth.slopes or smooth.value:
         out = out - smooth * delayed(x)
-    for delay in (constant, average):
+    for delay in others:
         if delay.slopes or delay.value:
             out = out + delay * rate
     skew = p(f"skew.{channel}@{p.recording}")

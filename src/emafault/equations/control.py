@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from ..actuator.commands import with_corners
-from ..first_order import filtered
+from ..delays import filtered
 from . import commutation, position
 from .acquisition import late_by, recorded_late, through
 from .dual import Dual, clip, value_of

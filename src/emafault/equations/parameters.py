@@ -25,7 +25,7 @@ ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 #: ways of coming late that someone has chosen, with what is the least; an average is over two samples at least
-MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "averaged": 0.5}
+MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "twice": LEAST_LAG, "averaged": 0.5}
 TALK = 0.03  # of its range, that a channel may take up of another's
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DEAD = 0.005  # of the current limit, that a current sensor may be dead within
@@ -168,10 +168,10 @@ def measuring_chain(
     """
     out = []
     phases = [f"{quantity}_{j}" for quantity in ("voltage", "current") for j in PER_PHASE]
-    # an angle is a sample, and no mean that a logger smooths; of currents the equations take what is recorded, which
-    # an average cannot be undone to
+    # an angle is a sample, and no mean that a logger smooths; of currents the equations take what is recorded, from
+    # which an average or a filter of the second order cannot be undone
     only = {
-        "speed": ("late", "early", "filtered", "averaged"), "angle": ("late", "early"),
+        "speed": ("late", "early", "filtered", "twice", "averaged"), "angle": ("late", "early"),
         "current": ("late", "early", "smoothed", "filtered"),
     }  # fmt: skip
     only |= dict.fromkeys(phases, acquisition.OF_ONE_PHASE)
@@ -183,7 +183,7 @@ def measuring_chain(
         ways = only.get(channel, ("late", "early", *MADE))
         variants = [_late(channel, way) for way in ways]
         if channel == "speed":
-            variants += [_late(SENSOR, "averaged")]
+            variants += [_late(SENSOR, way) for way in ("twice", "averaged")]
             variants += (
                 [_late(SENSOR, "late", 1.0)] if filters else [_late(SENSOR, way) for way in ("late", "filtered")]
             )

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...first_order import followed
+from ...delays import followed
 from ..left import Found, Left, Shape, beside_first, singly
 from ..model import Block
 from .spectrum import refined

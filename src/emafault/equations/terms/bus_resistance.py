@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...first_order import followed
+from ...delays import followed
 
 SENTENCE = "the supply sags under load"
 FILTER = 1e-3  # s

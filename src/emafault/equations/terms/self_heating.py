@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...first_order import followed
+from ...delays import followed
 
 SENTENCE = "the winding heats by its own loss"
 PARAMETERS = {"heating_rate": (0.0, 0.0, 0.15), "Rth": (3.0, 3.0, 1.2)}

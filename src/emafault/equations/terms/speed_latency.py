@@ -1,7 +1,7 @@
 """The measured speed is first-order filtered."""
 
-from ... import first_order
-from ...first_order import filtered
+from ... import delays
+from ...delays import filtered
 
 SENTENCE = "the speed sensor lags"
 SHAPES = ({"tau": 2e-4}, {"tau": 1e-3}, {"tau": 3e-3})
@@ -11,7 +11,7 @@ STEP = 1e-3  # of an interval, of which the derivative is taken
 
 def response(p, rec):
     """Recorded speed after one interval's speed of one, in that interval and those that follow."""
-    return first_order.response(max(p("tau").value, 0.0) / rec.interval)
+    return delays.response(filtered, max(p("tau").value, 0.0) / rec.interval)
 
 
 def speed(p, rec, w):

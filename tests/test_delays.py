@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
-from emafault.first_order import ahead, averaged, averaging, smoothed
+from emafault.delays import ahead, averaged, averaging, filtered_twice, smoothed
 
 SIGNAL = np.cumsum(np.random.default_rng(0).normal(size=400))
 BEFORE = np.concatenate([SIGNAL[:1], SIGNAL[:-1]])
@@ -39,3 +40,22 @@ def test_an_average_is_late_by_its_delay(delay):
 def test_an_average_over_whole_numbers_of_samples():
     np.testing.assert_allclose(averaged(SIGNAL, 1.0)[2:], np.convolve(SIGNAL, np.full(3, 1 / 3), "valid"), atol=1e-9)
     assert averaged(SIGNAL, 1.0)[0] == SIGNAL[0]
+
+
+@pytest.mark.parametrize("delay", [0.4, 3.0, 11.0])
+def test_a_filter_of_the_second_order_is_what_its_equation_says(delay):
+    """Means over intervals of what an integrator in small steps makes of the same."""
+    parts, x = 200, SIGNAL[:120] - SIGNAL[0]
+    A = np.array([[0.0, 1.0], [-2.0 / delay**2, -2.0 / delay]])
+    step = expm(A / parts)
+    y, means = np.zeros(2), []
+    for value in x:
+        at_rest = np.array([value, 0.0])
+        inside = []
+        for _ in range(parts):
+            inside.append(y[0])
+            y = at_rest + step @ (y - at_rest)
+        means.append(np.mean(inside) + 0.5 * (y[0] - inside[0]) / parts)
+    np.testing.assert_allclose(filtered_twice(SIGNAL[:120], delay) - SIGNAL[0], means, atol=1e-3)
+    line = np.arange(400.0)
+    np.testing.assert_allclose(filtered_twice(line, delay)[200:], line[200:] - delay, atol=1e-6)

@@ -1,4 +1,6 @@
-"""First-order filters along a signal, and its average over samples."""
+"""What makes a signal late: filters of the first and second order along it, and its average over samples."""
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -64,6 +66,31 @@ def filtered(x: np.ndarray, constant: float) -> np.ndarray:
     return x + (before - x) * (constant * (1.0 - decay))
 
 
+def filtered_twice(x: np.ndarray, delay: float) -> np.ndarray:
+    """Means over intervals of an analogue Butterworth filter's output of the second order, y + d y' + d^2/2 y'' = x,
+    (sample,), from the first value on.
+
+    x is constant within each interval; d, its delay, is in intervals.
+    """
+    return x if delay < LEAST else x[0] + _swung(x - x[0], 1.0 / delay)
+
+
+@compiled
+def _swung(x, a):
+    """The same from rest. What y lacks of x within an interval is exp(-a t) (C cos(a t) + D sin(a t))."""
+    faded, c, s = np.exp(-a), np.cos(a), np.sin(a)
+    mean_c, mean_s = (1.0 + faded * (s - c)) / (2.0 * a), (1.0 - faded * (s + c)) / (2.0 * a)
+    out = x.copy()
+    y = rate = 0.0  # at the interval's start; the rate over a
+    for n in range(x.shape[0]):
+        C = y - x[n]
+        D = rate + C
+        out[n] = x[n] + C * mean_c + D * mean_s
+        y = x[n] + faded * (C * c + D * s)
+        rate = faded * (D * (c - s) - C * (c + s))
+    return out
+
+
 def averaged(x: np.ndarray, delay: float) -> np.ndarray:
     """Means of each value and those before, (sample,), the first one before all; ``delay`` (intervals) is half of one
     less than their number, and half-way between two numbers it is half of both."""
@@ -92,8 +119,8 @@ def _numbers(delay: float) -> list[tuple[float, int]]:
     return [(1.0 - share, fewer + 1), (share, fewer + 2)]
 
 
-def response(constant: float) -> np.ndarray:
-    """(interval,) what :func:`filtered` makes of one interval of one, in that interval and those that follow."""
-    impulse = np.zeros(min(int(-np.log(FADED) * constant) + 4, LONGEST))
+def response(through: Callable[[np.ndarray, float], np.ndarray], delay: float) -> np.ndarray:
+    """(interval,) what a filter makes of one interval of one, in that interval and those that follow."""
+    impulse = np.zeros(min(int(-np.log(FADED) * delay) + 4, LONGEST))
     impulse[1] = 1.0
-    return filtered(impulse, constant)[1:]
+    return through(impulse, delay)[1:]
