@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import butter, lfilter
 
 from diagnosis import Case, simulate_bench
 from emafault import config
@@ -245,6 +246,12 @@ def averaged(x: np.ndarray, over: int) -> np.ndarray:
     return uniform_filter1d(x, over, axis=0, origin=(over - 1) // 2, mode="nearest")
 
 
+def with_counted_speed(r: Recording, n: int) -> Recording:
+    """A speed that is the difference of recorded angles eight intervals apart."""
+    before = np.concatenate([np.full(8, r.rotor_angle[0]), r.rotor_angle[:-8]])
+    return replace(r, rotor_speed=(r.rotor_angle - before) / (8.0 * r.interval))
+
+
 def with_voltages_in_currents(r: Recording, n: int) -> Recording:
     """Currents whose channels take up 0.5 mA a volt of their phase."""
     return replace(
@@ -425,6 +432,10 @@ CHANNELS = {
         "lag in sensor_current",
         phase_current=lambda i, n: averaged(i, 3), phase_current_end=lambda i, n: averaged(i, 3),
     ),
+    "speed behind a Butterworth filter of 200 Hz": changed(
+        "lag in sensor_speed", rotor_speed=lambda w, n: w[0] + lfilter(*butter(2, 200.0, fs=5000.0), w - w[0])
+    ),
+    "speed counted over eight intervals": Channel(itself=("lag in sensor_speed",), change=with_counted_speed),
     "speed averaged over nine samples": changed("lag in sensor_speed", rotor_speed=lambda w, n: averaged(w, 9)),
     "three faults at once": changed(
         "drift in sensor_current", "lag in sensor_voltage", "lag in sensor_output",
