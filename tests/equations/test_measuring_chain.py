@@ -9,6 +9,7 @@ import pytest
 from emafault.actuator.chain import Chain
 from emafault.actuator.parameters import RUN_DTYPE
 from emafault.delays import smoothed
+from emafault.diagnosis import naming
 from emafault.equations.corrected import _straightened, corrected, write_corrected
 from emafault.equations.diagnose import diagnose
 from emafault.errors import InputError
@@ -156,7 +157,8 @@ def test_an_angle_that_is_early_is_told_and_undone(tmp_path):
         late[name] = replace(r, rotor_angle=r.rotor_angle + 0.4 * (other - r.rotor_angle))
     names = list(late)
     found = diagnose("bench", late, (names[:3], names[3:]), ACTUATOR, NOISE)
-    assert found.verdict["which"][0]["effects"] == ["cogging"]
+    # a latency of the speed's sensor, of a seventh of an interval, is likely beside it and not sure enough to be named
+    assert [e for e, p in found.verdict["inclusion"].items() if p >= naming.NAMED] == ["cogging"]
     (told,) = found.verdict["discovered"]
     assert (told["form"], told["equation"]) == ("lag", "sensor_angle")
     (amount,) = told["parameters"].values()

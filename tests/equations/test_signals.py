@@ -45,6 +45,18 @@ def test_the_currents_noise_is_found_whatever_their_offsets(offset):
     assert found.current_end == pytest.approx(NOISE.current_end, rel=0.08)
 
 
+def test_currents_that_take_small_ones_for_none_have_noise_where_they_flow():
+    recordings = [recorded(seed=n) for n in range(2)]
+    dead = [
+        replace(r, **{name: x * (np.abs(x) > 0.1) for name in ("phase_current", "phase_current_end")
+                      if (x := getattr(r, name)) is not None})
+        for r in recordings
+    ]  # fmt: skip
+    found = estimated_noise(dead, NOISE)
+    assert 0.7 * NOISE.current < found.current < 1.1 * NOISE.current  # two of three that flow
+    assert 0.7 * NOISE.current_end < found.current_end < 1.1 * NOISE.current_end
+
+
 @pytest.mark.parametrize("step", [0.02, 0.05, 0.09])
 def test_coarse_steps_of_the_currents_are_noise_and_no_spikes(step):
     """Most sums of three rounded currents are the same; where one is taken for a spike, the lattice is lost."""

@@ -183,7 +183,6 @@ def measuring_chain(
         ways = only.get(channel, ("late", "early", *MADE))
         variants = [_late(channel, way) for way in ways]
         if channel == "speed":
-            variants += [_late(SENSOR, way) for way in ("twice", "averaged")]
             variants += (
                 [_late(SENSOR, "late", 1.0)] if filters else [_late(SENSOR, way) for way in ("late", "filtered")]
             )

@@ -286,7 +286,8 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     recording states is taken as it says.
 
     The angle's is taken of the most finely sampled recordings, the currents' of the sum of the phases, whatever offset
-    each of them has, or of phases that are off, where that is less or the sum is nothing by construction. Where a
+    each of them has, or of phases that are off, where that is less or the sum is nothing by construction; a channel
+    that reads the same throughout while its phase is off takes small currents for none, and tells nothing. Where a
     channel comes in coarse steps most differences of what changes slowly, or evenly, are none, and its noise is that of
     rounding at least (Widrow and Kollar 2008, Quantization Noise, chapter 1).
     """
@@ -321,8 +322,10 @@ def estimated_noise(recordings: Sequence[Recording], nominal: SensorNoise) -> Se
     if step == 0.0 or not summed:
         # where one channel lags behind the others their sum has of the ripple; where a phase is off there is none
         at_rest = summed or recordings
-        current = min(current, resting_noise(at_rest))
-        current_end = min(current_end, resting_noise(at_rest, end=True))
+        current, current_end = (
+            min(of_sum, rest) if rest > 0.0 or not summed else of_sum
+            for of_sum, rest in ((current, resting_noise(at_rest)), (current_end, resting_noise(at_rest, end=True)))
+        )
     output, speed = (
         robust([np.diff(_of_new(r, channel, new), 3) for r, new in quick]) / np.sqrt(20.0)
         for channel in ("output", "speed")
