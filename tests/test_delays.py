@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from emafault.delays import ahead, averaged, averaging, filtered_twice, smoothed
+from emafault.delays import ahead, averaged, averaging, butterworth, smoothed
 
 SIGNAL = np.cumsum(np.random.default_rng(0).normal(size=400))
 BEFORE = np.concatenate([SIGNAL[:1], SIGNAL[:-1]])
@@ -56,6 +56,6 @@ def test_a_filter_of_the_second_order_is_what_its_equation_says(delay):
             inside.append(y[0])
             y = at_rest + step @ (y - at_rest)
         means.append(np.mean(inside) + 0.5 * (y[0] - inside[0]) / parts)
-    np.testing.assert_allclose(filtered_twice(SIGNAL[:120], delay) - SIGNAL[0], means, atol=1e-3)
+    np.testing.assert_allclose(butterworth(SIGNAL[:120], delay) - SIGNAL[0], means, atol=1e-3)
     line = np.arange(400.0)
-    np.testing.assert_allclose(filtered_twice(line, delay)[200:], line[200:] - delay, atol=1e-6)
+    np.testing.assert_allclose(butterworth(line, delay)[200:], line[200:] - delay, atol=1e-6)

@@ -66,17 +66,17 @@ def filtered(x: np.ndarray, constant: float) -> np.ndarray:
     return x + (before - x) * (constant * (1.0 - decay))
 
 
-def filtered_twice(x: np.ndarray, delay: float) -> np.ndarray:
+def butterworth(x: np.ndarray, delay: float) -> np.ndarray:
     """Means over intervals of an analogue Butterworth filter's output of the second order, y + d y' + d^2/2 y'' = x,
     (sample,), from the first value on.
 
     x is constant within each interval; d, its delay, is in intervals.
     """
-    return x if delay < LEAST else x[0] + _swung(x - x[0], 1.0 / delay)
+    return x if delay < LEAST else x[0] + _second_order(x - x[0], 1.0 / delay)
 
 
 @compiled
-def _swung(x, a):
+def _second_order(x, a):
     """The same from rest. What y lacks of x within an interval is exp(-a t) (C cos(a t) + D sin(a t))."""
     faded, c, s = np.exp(-a), np.cos(a), np.sin(a)
     mean_c, mean_s = (1.0 + faded * (s - c)) / (2.0 * a), (1.0 - faded * (s + c)) / (2.0 * a)
@@ -94,29 +94,16 @@ def _swung(x, a):
 def averaged(x: np.ndarray, delay: float) -> np.ndarray:
     """Means of each value and those before, (sample,), the first one before all; ``delay`` (intervals) is half of one
     less than their number, and half-way between two numbers it is half of both."""
-    weights = averaging(delay)
-    before = np.concatenate([np.full(len(weights) - 1, x[0]), x])
-    sums = np.concatenate([[0.0], np.cumsum(before - x[0])])
-    out = np.full(len(x), x[0])
-    for weight, count in _numbers(delay):
-        first = len(weights) - count
-        out += weight / count * (sums[len(weights) :] - sums[first : first + len(x)])
-    return out
+    return x[0] + np.convolve(x - x[0], averaging(delay))[: len(x)]
 
 
 def averaging(delay: float) -> np.ndarray:
     """(interval,) weights of :func:`averaged`, of the latest value first."""
-    out = np.zeros(max(count for _, count in _numbers(delay)))
-    for weight, count in _numbers(delay):
-        out[:count] += weight / count
-    return out
-
-
-def _numbers(delay: float) -> list[tuple[float, int]]:
-    """Weights of the averages over one number of samples and over one more."""
     fewer = int(2.0 * delay)
     share = 2.0 * delay - fewer
-    return [(1.0 - share, fewer + 1), (share, fewer + 2)]
+    out = np.full(fewer + 2, share / (fewer + 2))
+    out[:-1] += (1.0 - share) / (fewer + 1)
+    return out
 
 
 def response(through: Callable[[np.ndarray, float], np.ndarray], delay: float) -> np.ndarray:

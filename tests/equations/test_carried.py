@@ -156,7 +156,7 @@ def test_what_is_in_a_channel_or_a_coefficient_lies_there():
         ),
         ("~lag_current", {"lag.current_smoothed": 0.4}, {"place": "current", "form": "smoothing", "delay": 0.4}),
         ("~lag_speed", {"lag.speed_filtered": 0.4}, {"place": "speed", "form": "low_pass", "delay": 0.4}),
-        ("~lag_output", {"lag.output_twice": 4.0}, {"place": "output", "form": "butterworth", "delay": 4.0}),
+        ("~lag_output", {"lag.output_butterworth": 4.0}, {"place": "output", "form": "butterworth", "delay": 4.0}),
         ("~lag_speed", {"lag.speed_averaged": 4.0}, {"place": "speed", "form": "averaging", "samples": 9.0}),
         ("~lag_voltage", {"lag.voltage_filtered": 0.4}, {"place": "voltage", "form": "low_pass", "delay": 0.4}),
         (

@@ -132,7 +132,7 @@ RECORDER = {
     "filter of the speed": ({"place": "speed", "form": "low_pass", "delay": 4.0}, {"lag.speed_filtered": 4.0}),
     "second-order filter of the speed": (
         {"place": "speed", "form": "butterworth", "delay": 4.0},
-        {"lag.speed_twice": 4.0},
+        {"lag.speed_butterworth": 4.0},
     ),
     "average of the speed": ({"place": "speed", "form": "averaging", "samples": 9.0}, {"lag.speed_averaged": 4.0}),
     "lag of one current": ({"place": "current_b", "form": "lag", "lag": 0.3}, {"lag.current_b_late": 0.3}),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..delays import averaged, filtered, filtered_twice, smoothed
+from ..delays import averaged, butterworth, filtered, smoothed
 from ..resampled import before
 from ..switches import direction
 from .grammar import CONTROLLER, FACTORS, IN_RUN, LOGGERS, MACHINE, PHASES, SHAPES, of_recording
@@ -27,7 +27,7 @@ RECORDED |= {of: tuple(n for c in channels for n in RECORDED[c]) for of, channel
 #: of a channel that comes late: by a share of an interval, by exponential smoothing, behind an analogue filter, by an
 #: average over samples
 LATE = ("lag", "smoothing", "low_pass", "butterworth", "averaging")
-THROUGH = {"smoothing": smoothed, "low_pass": filtered, "butterworth": filtered_twice}  # by their delay
+THROUGH = {"smoothing": smoothed, "low_pass": filtered, "butterworth": butterworth}  # by their delay
 AFTER_NOISE = ("spikes", "held", "hold", "clipping", "adc_step")
 #: of the forms, shapes first
 ORDER = ("", "gain", "sensor_curve", "drop", "crosstalk", "pickup", *LATE, "clock", "drift", *AFTER_NOISE)

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..actuator.grammar import LOGGERS
 from ..actuator.parameters import ActuatorParameters
-from ..delays import LEAST, ahead, averaged, averaging, filtered, filtered_twice, response, smoothed
+from ..delays import LEAST, ahead, averaged, averaging, butterworth, filtered, response, smoothed
 from ..switches import direction, turning
 from .dual import Dual
 from .point import Point, effect_name
@@ -26,7 +26,7 @@ from .terms import with_hook
 CLOCKS = {channel: (channel,) for channel in ("angle", "output", "speed")} | LOGGERS
 OF_ONE_PHASE = ("late", "early")  # ways in which one phase's channel of voltage or current may lag by itself
 #: way of coming late that is told by its delay -> what it makes of a signal
-OPERATES = {"smoothed": smoothed, "filtered": filtered, "twice": filtered_twice, "averaged": averaged}
+OPERATES = {"smoothed": smoothed, "filtered": filtered, "butterworth": butterworth, "averaged": averaged}
 STEP = 1e-4  # interval, of a difference by them
 #: beginnings of the names of a channel's gain, less one, and of what it grows by along a recording
 GAIN_NAMES = ("gain", "gain_drift")
@@ -59,7 +59,7 @@ class Late(NamedTuple):
     early: Dual
     smooth: Dual
     constant: Dual
-    twice: Dual
+    second: Dual
     average: Dual
 
 
@@ -125,9 +125,9 @@ def as_before(x: np.ndarray, late: Dual, channel: str) -> Dual:
 
 def response_of(p: Point, channel: str) -> np.ndarray:
     """(interval,) what a channel that lags, filters or averages records of one interval of one."""
-    late, early, _, constant, twice, average = (float(x.value) for x in _late(p, channel, ""))
+    late, early, _, constant, second, average = (float(x.value) for x in _late(p, channel, ""))
     out = np.convolve(np.convolve([1.0 - late, late], [early, 1.0 - early]), averaging(average))
-    for through_it, delay in ((filtered, constant), (filtered_twice, twice)):
+    for through_it, delay in ((filtered, constant), (butterworth, second)):
         if delay > LEAST:
             out = np.convolve(out, response(through_it, delay))
     return out
@@ -160,7 +160,7 @@ def late_by(p: Point, channel: str) -> Dual:
 
 def undone(p: Point, channel: str, x: np.ndarray, rate: np.ndarray, phase: str = "") -> Dual:
     """The true signal from one recorded on a channel that lags, smooths or filters; from one that averages or
-    filters twice, on time.
+    has a filter of the second order, on time.
 
     ``rate``: change of the recorded signal over an interval, of what is a mean over it from its start to its end.
     """

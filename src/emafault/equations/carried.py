@@ -35,7 +35,7 @@ CONTROLLER: dict[str, Callable[[float], Entry]] = {
     "feedforward": lambda x: {"form": "feedforward", "gain": x},
 }
 #: how a channel comes late -> form
-SMOOTH = {"smoothed": "smoothing", "filtered": "low_pass", "twice": "butterworth"}
+SMOOTH = {"smoothed": "smoothing", "filtered": "low_pass", "butterworth": "butterworth"}
 LATE_SENSOR = f"lag.{SENSOR}_"  # beginning of the names of what comes late before the controller takes it
 
 

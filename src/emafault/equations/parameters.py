@@ -25,7 +25,7 @@ ZERO = 0.5 * REST  # rad of the rotor, by which its angle at rest is known
 TIMING = 0.5  # of a control period, by which samples and means within it may be told apart
 LEAST_LAG = 0.1  # of an interval, that a lag between channels is worth telling from
 #: ways of coming late that someone has chosen, with what is the least; an average is over two samples at least
-MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "twice": LEAST_LAG, "averaged": 0.5}
+MADE = {"smoothed": LEAST_LAG, "filtered": LEAST_LAG, "butterworth": LEAST_LAG, "averaged": 0.5}
 TALK = 0.03  # of its range, that a channel may take up of another's
 BEND = 0.03  # of a channel's full range, that its curve may be off by there
 DEAD = 0.005  # of the current limit, that a current sensor may be dead within
@@ -171,7 +171,7 @@ def measuring_chain(
     # an angle is a sample, and no mean that a logger smooths; of currents the equations take what is recorded, from
     # which an average or a filter of the second order cannot be undone
     only = {
-        "speed": ("late", "early", "filtered", "twice", "averaged"), "angle": ("late", "early"),
+        "speed": ("late", "early", "filtered", "butterworth", "averaged"), "angle": ("late", "early"),
         "current": ("late", "early", "smoothed", "filtered"),
     }  # fmt: skip
     only |= dict.fromkeys(phases, acquisition.OF_ONE_PHASE)

@@ -15,7 +15,7 @@ LATE = {
     "late": "comes late by {late:.2g} intervals", "early": "comes early by {late:.2g} intervals",
     "smoothed": "is smoothed with a memory of {late:.2g} intervals",
     "filtered": "is behind a first-order filter with a time constant of {late:.2g} intervals",
-    "twice": "is behind a second-order Butterworth filter that delays it by {late:.2g} intervals",
+    "butterworth": "is behind a second-order Butterworth filter that delays it by {late:.2g} intervals",
     "averaged": "is averaged over {samples:.2g} samples, and comes late by {late:.2g} intervals",
 }  # fmt: skip
 CHANNELS = {
